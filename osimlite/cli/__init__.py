@@ -8,11 +8,12 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from typer import Typer
 
+    from osimlite.cli._command import Command
     from osimlite.errors import OsimliteError
 
 COMMANDS = (
@@ -20,6 +21,9 @@ COMMANDS = (
     "optimize", "gait", "find-gait", "muscles", "kinematics", "inverse-dynamics", "lsp", "doctor", "demo",
 )  # fmt: skip
 """Every command in the order of the help; ``osimlite.cli.<name>.<name>``, with _ for -, is its function."""
+
+COMPLETING = "_OSIMLITE_COMPLETE"
+"""Set by a shell that asks how a word can go on."""
 
 
 def app(names: Sequence[str] = COMMANDS) -> Typer:
@@ -35,9 +39,8 @@ def app(names: Sequence[str] = COMMANDS) -> Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     for name in names:
-        function = name.replace("-", "_")
-        command = getattr(import_module(f"osimlite.cli.{function}"), function)
-        application.command(name, help=_flowing(command.__doc__))(command)
+        command = _loaded(name)
+        application.command(name, help=_flowing(command.__doc__ or ""))(command)
 
     @application.callback(invoke_without_command=True)
     def osimlite(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
@@ -46,6 +49,12 @@ def app(names: Sequence[str] = COMMANDS) -> Typer:
             raise typer.Exit
 
     return application
+
+
+def _loaded(name: str) -> Command:
+    function = name.replace("-", "_")
+    command: Command = getattr(import_module(f"osimlite.cli.{function}"), function)
+    return command
 
 
 def _tell_version() -> None:
@@ -58,35 +67,6 @@ def _tell_version() -> None:
 def _flowing(text: str) -> str:
     """The text with each paragraph in one line: terminals are not as wide as the source."""
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
-
-
-def _plainly(words: list[str]) -> dict[str, Any] | None:
-    """What ``validate`` is asked for, if that is simple: editors and hooks call it all the time.
-
-    The library that reads options takes a third of the time such a call needs. None leaves everything else to it.
-    """
-    if words[:1] != ["validate"]:
-        return None
-    paths: list[str] = []
-    asked: dict[str, Any] = {"paths": paths}
-    rest = iter(words[1:])
-    for word in rest:
-        if word == "-" or not word.startswith("-"):
-            paths.append(word)
-        elif word == "--no-cache":
-            asked["cached"] = False
-        elif word == "--all":
-            asked["everything"] = True
-        elif word == "--skip-other-xml":
-            asked["only_ours"] = True
-        elif word in ("--format", "--fail-on"):
-            value = next(rest, None)
-            if value is None:
-                return None
-            asked[word[2:].replace("-", "_")] = value
-        else:
-            return None
-    return asked if paths else None
 
 
 def _built_in(error: OsimliteError) -> str:
@@ -136,11 +116,6 @@ def _run(words: list[str]) -> None:
         if words == ["--version"]:
             _tell_version()
             return
-        asked = _plainly(words)
-        if asked is not None:
-            from osimlite.cli._validating import run
-
-            raise SystemExit(run(**asked))
         if sys.stderr.isatty():
             from osimlite.cli._progress import tell_of_compiling
 
@@ -153,6 +128,12 @@ def _run(words: list[str]) -> None:
             warnings.simplefilter("once", DoubtfulWarning)
             # Options refuse such a number, or were given its unit.
             warnings.simplefilter("ignore", UnitWarning)
+            if names != COMMANDS and COMPLETING not in os.environ:
+                command = _loaded(words[0])
+                given = command.read(words[1:])
+                if given is not None:
+                    command(**given)
+                    raise SystemExit(0)
             raise SystemExit(app(names)(args=words, prog_name="osimlite", standalone_mode=False))
     except OsimliteError as error:
         complain(error, _built_in(error))
@@ -180,6 +161,6 @@ def _run(words: list[str]) -> None:
         if not hasattr(error, "format_message"):
             raise
         context = getattr(error, "ctx", None)
-        command = context.command_path if context is not None else "osimlite"
-        complain(f"{error.format_message().rstrip('.')}; '{command} --help' lists what there is")
+        path = context.command_path if context is not None else "osimlite"
+        complain(f"{error.format_message().rstrip('.')}; '{path} --help' lists what there is")
         raise SystemExit(2) from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from osimlite.text import harmless, visible
@@ -110,6 +110,17 @@ def wants_colour() -> bool:
     return not detect_legacy_windows()
 
 
+def columns() -> int:
+    """How many letters a line has here."""
+    told = os.environ.get("COLUMNS", "")
+    if told.isdigit():
+        return int(told)
+    for stream in range(3):
+        with suppress(OSError):
+            return os.get_terminal_size(stream).columns or 80
+    return 80
+
+
 def plain_console(**choices: Any) -> Console:
     """A console that prints text as it is: names of files and messages of others may look like its markup."""
     from rich.console import Console
@@ -142,10 +153,28 @@ class Facts:
         self.rows.append((name, words))
 
     def show(self) -> None:
-        """Print them as a table; a long name goes on in the next line."""
+        """Print them as a table; what is too long for its column goes on in the next line."""
+        rows = [(visible(name), visible(words)) for name, words in self.rows]
+        width = max((len(name) for name, _ in rows), default=0)
+        room = columns() - width - 2
+        if room < 30 or not all(name.isascii() and words.isascii() for name, words in rows):
+            self._show_any(rows)
+            return
+        from textwrap import wrap
+
+        italic, bold, end = ("\033[3m", "\033[1m", "\033[0m") if wants_colour() else ("", "", "")
+        if self.title:
+            show(f"{italic}{visible(self.title)}{end}\n")
+        for name, words in rows:
+            for line in wrap(words, room, break_on_hyphens=False) or [""]:
+                show(f"{bold}{name:{width}}{end}  {line}".rstrip() + "\n")
+                name = ""
+
+    def _show_any(self, rows: list[tuple[str, str]]) -> None:
+        """Print them where there is little room, or where letters are as wide as two: by a library that knows both."""
         table = plain_table(self.title, show_header=False)
         table.add_column(style="bold", overflow="fold")
         table.add_column(overflow="fold")
-        for row in self.rows:
-            add_row(table, *row)
+        for row in rows:
+            table.add_row(*row)
         plain_console().print(table)

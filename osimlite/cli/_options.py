@@ -6,41 +6,41 @@ from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from osimlite.cli._command import Argument, Option
 
 if TYPE_CHECKING:
     from osimlite.document.printer import Numbers as NumberStyle
     from osimlite.multibody.mechanism import Mechanism
     from osimlite.schema.model import Model
 
-File = Annotated[Path, typer.Argument(help="A model file.", show_default=False)]
+File = Annotated[Path, Argument(help="A model file.", show_default=False)]
 Source = Annotated[
-    str, typer.Argument(help="A model file, or anything that 'osimlite build' makes one of.", show_default=False)
+    str, Argument(help="A model file, or anything that 'osimlite build' makes one of.", show_default=False)
 ]
-Motion = Annotated[Path, typer.Argument(help="Coordinates over time, .sto or .mot.", show_default=False)]
+Motion = Annotated[Path, Argument(help="Coordinates over time, .sto or .mot.", show_default=False)]
 Parameters = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         "-p", "--parameter", metavar="NAME=VALUE", help="Set a parameter of the model function.", show_default=False
     ),
 ]
 Start = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Where a coordinate starts (rad, m, or 30deg)."),
+    Option("--set", metavar="NAME=VALUE", help="Where a coordinate starts (rad, m, or 30deg)."),
 ]
 StartSpeed = Annotated[
     list[str] | None,
-    typer.Option("--set-speed", metavar="NAME=VALUE", help="At what speed a coordinate starts (per second)."),
+    Option("--set-speed", metavar="NAME=VALUE", help="At what speed a coordinate starts (per second)."),
 ]
-To = Annotated[float, typer.Option("--to", metavar="SECONDS", help="How long to simulate.")]
+To = Annotated[float, Option("--to", metavar="SECONDS", help="How long to simulate.")]
 Engine = Annotated[
     str,
-    typer.Option(help="What computes the accelerations: 'bullet', 'compiled', or 'auto': the first that is installed."),
+    Option(help="What computes the accelerations: 'bullet', 'compiled', or 'auto': the first that is installed."),
 ]
-Accuracy = Annotated[float | None, typer.Option(help="Of the integrator, as in OpenSim.", show_default="0.001")]
+Accuracy = Annotated[float | None, Option(help="Of the integrator, as in OpenSim.", show_default="0.001")]
 Integrator = Annotated[
     str | None,
-    typer.Option(
+    Option(
         show_default="merson",
         help="'merson', whose steps are OpenSim's; 'adams' for smooth motion, as of few muscles; 'bdf' for stiff "
         "motion, as of many; 'rosenbrock' for stiff motion at loose accuracy.",
@@ -48,44 +48,42 @@ Integrator = Annotated[
 ]
 Wrapping = Annotated[
     str,
-    typer.Option(help="How paths bend around surfaces: 'opensim', as there; 'geodesic', smoothly, the shortest way."),
+    Option(help="How paths bend around surfaces: 'opensim', as there; 'geodesic', smoothly, the shortest way."),
 ]
-SkipUnsupported = Annotated[bool, typer.Option("--skip-unsupported", help="Leave out forces that cannot be computed.")]
+SkipUnsupported = Annotated[bool, Option("--skip-unsupported", help="Leave out forces that cannot be computed.")]
 ExternalLoads = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", help="Measured forces that act too: a file of ExternalLoads.", show_default=False),
+    Option(metavar="FILE", help="Measured forces that act too: a file of ExternalLoads.", show_default=False),
 ]
 Lowpass = Annotated[
     float | None,
-    typer.Option(
-        metavar="HZ", help="Filter the coordinates first, as OpenSim's tools do; 6 is usual.", show_default=False
-    ),
+    Option(metavar="HZ", help="Filter the coordinates first, as OpenSim's tools do; 6 is usual.", show_default=False),
 ]
 Foot = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         metavar="CONTACT",
         help="Contact of a foot, with + between several of one foot; once for each foot.",
         show_default="the ends of the legs",
     ),
 ]
-Equilibrate = Annotated[bool, typer.Option("--equilibrate", help="Start muscles in equilibrium of fibers and tendon.")]
+Equilibrate = Annotated[bool, Option("--equilibrate", help="Start muscles in equilibrium of fibers and tendon.")]
 Controls = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         "--controls",
         metavar="CONTROLS",
         help="Drive actuators: the file of a table of controls over time, or NAME=VALUE; may be given several times.",
         show_default=False,
     ),
 ]
-Numbers = Annotated[str, typer.Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")]
+Numbers = Annotated[str, Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")]
 OnlyOurs = Annotated[
-    bool, typer.Option("--skip-other-xml", help="Pass over XML that is not OpenSim's, also where it is named.")
+    bool, Option("--skip-other-xml", help="Pass over XML that is not OpenSim's, also where it is named.")
 ]
 Folder = Annotated[
     Path | None,
-    typer.Option(
+    Option(
         "-o",
         "--output",
         metavar="FOLDER",
@@ -95,7 +93,7 @@ Folder = Annotated[
 ]
 Geometry = Annotated[
     list[Path] | None,
-    typer.Option(
+    Option(
         "--geometry",
         metavar="FOLDER",
         help="Look for mesh files here too, after the model's folder and its folder Geometry; may be repeated. "
@@ -104,7 +102,7 @@ Geometry = Annotated[
     ),
 ]
 
-Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")]
+Browser = Annotated[bool, Option("--browser/--no-browser", help="Open the page in the browser.")]
 
 
 def results_folder(file: Path, output: Path | None) -> Path:

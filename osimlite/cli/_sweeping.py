@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
+from osimlite.cli._command import Option
 from osimlite.cli._options import named_words, read_source
 
 if TYPE_CHECKING:
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
 
 Vary = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         "--vary",
         metavar="NAME=RANGE",
         help="LOW:HIGH (in a sweep also LOW:HIGH:COUNT; with :log at the end, spread by the logarithm) of a "
@@ -28,32 +27,28 @@ Vary = Annotated[
 ]
 ReportInterval = Annotated[
     float | None,
-    typer.Option(
+    Option(
         metavar="SECONDS",
         help="Time between the states that a function or an expression looks at.",
         show_default="0.01 for expressions",
     ),
 ]
-Interpolation = Annotated[str, typer.Option(help="Between nodes of a control: 'linear', 'steps' or 'cubic'.")]
+Interpolation = Annotated[str, Option(help="Between nodes of a control: 'linear', 'steps' or 'cubic'.")]
 Below = Annotated[
     list[str] | None,
-    typer.Option(
-        "--stop-below", metavar="NAME=VALUE", help="End a run when a coordinate falls below.", show_default=False
-    ),
+    Option("--stop-below", metavar="NAME=VALUE", help="End a run when a coordinate falls below.", show_default=False),
 ]
 Above = Annotated[
     list[str] | None,
-    typer.Option(
-        "--stop-above", metavar="NAME=VALUE", help="End a run when a coordinate rises above.", show_default=False
-    ),
+    Option("--stop-above", metavar="NAME=VALUE", help="End a run when a coordinate rises above.", show_default=False),
 ]
 Planted = Annotated[
     bool,
-    typer.Option("--planted", help="Put the walker on the ground with the deeper foot, at rest there, at each start."),
+    Option("--planted", help="Put the walker on the ground with the deeper foot, at rest there, at each start."),
 ]
 Workers = Annotated[
     int | None,
-    typer.Option(
+    Option(
         min=1,
         metavar="N",
         help="How many threads or processes work here.",
@@ -62,7 +57,7 @@ Workers = Annotated[
 ]
 Cluster = Annotated[
     str | None,
-    typer.Option(metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.", show_default=False),
+    Option(metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.", show_default=False),
 ]
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from osimlite.cli import _options as options
+from osimlite.cli._command import Argument, Option, command
 
 
+@command
 def build(
     source: Annotated[
         str | None,
-        typer.Argument(
+        Argument(
             help="A built-in model (see --list), a Python file or module:function that returns a Model, "
             "or a YAML or JSON file.",
             show_default=False,
@@ -21,7 +21,7 @@ def build(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "-o",
             "--output",
             metavar="FILE",
@@ -31,7 +31,7 @@ def build(
     ] = None,
     parameter: options.Parameters = None,
     numbers: options.Numbers = "shortest",
-    list_models: Annotated[bool, typer.Option("--list", help="Name the built-in models and stop.")] = False,
+    list_models: Annotated[bool, Option("--list", help="Name the built-in models and stop.")] = False,
 ) -> None:
     """Make a built-in model, or one of yours in Python, YAML or JSON, and write its .osim file.
 
@@ -59,7 +59,7 @@ def build(
 
         show(render(report, "full"), err=True)
         complain(f"'{source}' has errors; nothing was written")
-        raise typer.Exit(1)
+        raise SystemExit(1)
     if str(output) == "-":
         hand_over(to_text(model, numbers=style))
         return

@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
-import typer
-
 from osimlite.cli import _options as options
+from osimlite.cli._command import Option, command
 from osimlite.cli._console import say, show
 from osimlite.cli._progress import motion_bar
 from osimlite.text import listed
@@ -45,11 +44,12 @@ class Motion(NamedTuple):
     command: str
 
 
+@command
 def demo(
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder for everything the tour makes.")
+        Path, Option("-o", "--output", metavar="FOLDER", help="Folder for everything the tour makes.")
     ] = Path("osimlite-demo"),
-    pictures: Annotated[bool, typer.Option(help="Draw the plots, and write the pages for the browser.")] = True,
+    pictures: Annotated[bool, Option(help="Draw the plots, and write the pages for the browser.")] = True,
     browser: options.Browser = True,
 ) -> None:
     """Build, check, translate and simulate: a walker that falls, one that walks, a human who jumps by muscles.

@@ -5,16 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from osimlite.cli._command import Argument, Option, command
 
 if TYPE_CHECKING:
     from osimlite.schema.difference import Difference
 
 
+@command
 def diff(
-    files: Annotated[list[Path], typer.Argument(metavar="OLD NEW", help="The two files.", show_default=False)],
+    files: Annotated[list[Path], Argument(metavar="OLD NEW", help="The two files.", show_default=False)],
     git: Annotated[
-        bool, typer.Option("--git", help="Take the seven arguments that git gives an external diff program.")
+        bool, Option("--git", help="Take the seven arguments that git gives an external diff program.")
     ] = False,
 ) -> None:
     """Show what changed between two models or setups: component, property, old and new value.
@@ -57,7 +58,7 @@ def diff(
     for line in lines:
         say(line)
     if lines and not git:
-        raise typer.Exit(1)
+        raise SystemExit(1)
 
 
 def described(found: list[Difference]) -> list[str]:

@@ -11,8 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-import typer
-
+from osimlite.cli._command import Argument, command
 from osimlite.cli._console import add_row, plain_console, plain_table, say
 from osimlite.cli._progress import progress_bar
 
@@ -70,10 +69,11 @@ class Package(NamedTuple):
     trouble: str
 
 
+@command
 def doctor(
     model: Annotated[
         Path | None,
-        typer.Argument(help="A model file, or a folder: its settings and mesh folders are shown.", show_default=False),
+        Argument(help="A model file, or a folder: its settings and mesh folders are shown.", show_default=False),
     ] = None,
 ) -> None:
     """Show what is installed, what each extra adds and how to get it, and where mesh files are looked for.
@@ -121,7 +121,7 @@ def doctor(
     for package in broken:
         say(f"{package.name} {package.version} cannot be loaded: {package.trouble}")
     if broken:
-        raise typer.Exit(1)
+        raise SystemExit(1)
 
 
 def requirements() -> dict[str, list[str]]:

@@ -5,47 +5,43 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
+from osimlite.cli._command import Option, command
 from osimlite.cli._console import Facts
 
 if TYPE_CHECKING:
     from osimlite.sweep.gaits import Gait
 
 
+@command
 def find_gait(
     source: options.Source,
     vary: sweeping.Vary = None,
-    samples: Annotated[int, typer.Option(min=1, metavar="N", help="How many random walkers are tried.")] = 65536,
-    tries: Annotated[
-        int, typer.Option(min=1, metavar="N", help="How many of the best of them are led to a cycle.")
-    ] = 40,
-    enough: Annotated[int, typer.Option(min=1, metavar="N", help="Cycles after which no more are looked for.")] = 5,
+    samples: Annotated[int, Option(min=1, metavar="N", help="How many random walkers are tried.")] = 65536,
+    tries: Annotated[int, Option(min=1, metavar="N", help="How many of the best of them are led to a cycle.")] = 40,
+    enough: Annotated[int, Option(min=1, metavar="N", help="Cycles after which no more are looked for.")] = 5,
     budget: Annotated[
-        int, typer.Option(min=0, metavar="N", help="Sets of numbers to try on the way to the most stable cycle.")
+        int, Option(min=0, metavar="N", help="Sets of numbers to try on the way to the most stable cycle.")
     ] = 300,
     stable: Annotated[
-        float, typer.Option(help="A largest multiplier below this is small enough; then the basin counts.")
+        float, Option(help="A largest multiplier below this is small enough; then the basin counts.")
     ] = 0.6,
     perturb: Annotated[
-        float, typer.Option(metavar="PART", help="How near the cycle walkers start for that: 0.1 is 10 %.")
+        float, Option(metavar="PART", help="How near the cycle walkers start for that: 0.1 is 10 %.")
     ] = 0.1,
-    digits: Annotated[
-        int, typer.Option(min=1, max=17, metavar="N", help="Round the numbers of the model to so many.")
-    ] = 3,
+    digits: Annotated[int, Option(min=1, max=17, metavar="N", help="Round the numbers of the model to so many.")] = 3,
     start_digits: Annotated[
         int | None,
-        typer.Option(min=1, max=17, metavar="N", help="Round the start to so many.", show_default="not rounded"),
+        Option(min=1, max=17, metavar="N", help="Round the start to so many.", show_default="not rounded"),
     ] = None,
-    seed: Annotated[int, typer.Option(help="The same seed, the same search.")] = 0,
+    seed: Annotated[int, Option(help="The same seed, the same search.")] = 0,
     foot: options.Foot = None,
     parameter: options.Parameters = None,
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FOLDER", help="For best.osim, cycles.csv, summary.json.")
+        Path, Option("-o", "--output", metavar="FOLDER", help="For best.osim, cycles.csv, summary.json.")
     ] = Path("found"),
-    force: Annotated[bool, typer.Option("--force", help="Replace what another search found.")] = False,
+    force: Annotated[bool, Option("--force", help="Replace what another search found.")] = False,
     skip_unsupported: options.SkipUnsupported = False,
 ) -> None:
     """Look for the numbers of a model, and the start, with which a walker never stops; writes it, ready to walk.
@@ -69,7 +65,7 @@ def find_gait(
         )  # fmt: skip
     _told(gait).show()
     if not (gait.walk.walks and not gait.walk.scuffs and gait.found.cycle.largest < 1.0):
-        raise typer.Exit(1)
+        raise SystemExit(1)
 
 
 def _told(gait: Gait) -> Facts:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from osimlite.cli import _options as options
+from osimlite.cli._command import Argument, Option, command
 
 
+@command
 def format(
     paths: Annotated[
-        list[str], typer.Argument(help="Files (.osim, .xml, .omoco), or folders to search.", show_default=False)
+        list[str], Argument(help="Files (.osim, .xml, .omoco), or folders to search.", show_default=False)
     ],
-    check: Annotated[bool, typer.Option("--check", help="Change nothing; exit with 1 if a file would change.")] = False,
-    show_diff: Annotated[bool, typer.Option("--diff", help="Change nothing; print what would change.")] = False,
+    check: Annotated[bool, Option("--check", help="Change nothing; exit with 1 if a file would change.")] = False,
+    show_diff: Annotated[bool, Option("--diff", help="Change nothing; print what would change.")] = False,
     only_ours: options.OnlyOurs = False,
 ) -> None:
     """Write files in one layout: OpenSim's, one property a line, shortest numbers, people's comments kept.
@@ -61,6 +61,6 @@ def format(
         files = "1 file is" if same == 1 else f"{same} files are"
         say(f"{files} formatted already", err=True)
     if worst:
-        raise typer.Exit(worst)
+        raise SystemExit(worst)
     if changed and (check or show_diff):
-        raise typer.Exit(1)
+        raise SystemExit(1)

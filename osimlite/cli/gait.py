@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from osimlite.cli import _options as options
+from osimlite.cli._command import Option, command
 from osimlite.cli._console import Facts
 from osimlite.cli._progress import progress_bar
 
@@ -27,38 +26,35 @@ WALK_ACCURACY = 1e-6
 """Of the integrator in the walk from the start; the step map takes its own."""
 
 
+@command
 def gait(
     source: options.Source,
     start: options.Start = None,
     start_speed: options.StartSpeed = None,
     foot: options.Foot = None,
-    to: Annotated[float, typer.Option("--to", metavar="SECONDS", help="How long to walk at most.")] = 60.0,
-    settle: Annotated[int, typer.Option(min=0, metavar="N", help="Steps to make before the cycle is looked for.")] = 0,
-    accuracy: Annotated[float, typer.Option(help="Of the integrator in the step map.")] = 1e-10,
+    to: Annotated[float, Option("--to", metavar="SECONDS", help="How long to walk at most.")] = 60.0,
+    settle: Annotated[int, Option(min=0, metavar="N", help="Steps to make before the cycle is looked for.")] = 0,
+    accuracy: Annotated[float, Option(help="Of the integrator in the step map.")] = 1e-10,
     perturb: Annotated[
         list[float] | None,
-        typer.Option(
+        Option(
             metavar="PART", help="Change the start at random by this part at most: 0.05 is 5 %.", show_default=False
         ),
     ] = None,
-    starts: Annotated[int, typer.Option(min=1, metavar="N", help="How many such starts.")] = 60,
-    seed: Annotated[int, typer.Option(help="The same seed, the same such starts.")] = 0,
-    steps: Annotated[int, typer.Option(min=1, metavar="N", help="Steps after which a walker counts as walking.")] = 20,
-    basin: Annotated[
-        bool, typer.Option("--basin", help="Look from where on a grid around the cycle it walks.")
-    ] = False,
+    starts: Annotated[int, Option(min=1, metavar="N", help="How many such starts.")] = 60,
+    seed: Annotated[int, Option(help="The same seed, the same such starts.")] = 0,
+    steps: Annotated[int, Option(min=1, metavar="N", help="Steps after which a walker counts as walking.")] = 20,
+    basin: Annotated[bool, Option("--basin", help="Look from where on a grid around the cycle it walks.")] = False,
     basin_x: Annotated[
-        str, typer.Option(metavar="NAME", help="What the columns change: COORDINATE or COORDINATE/speed.")
+        str, Option(metavar="NAME", help="What the columns change: COORDINATE or COORDINATE/speed.")
     ] = "",
-    basin_y: Annotated[str, typer.Option(metavar="NAME", help="What the rows change.")] = "",
-    reach: Annotated[float, typer.Option(help="How far from the cycle, rad, m or per second.")] = 0.5,
-    grid: Annotated[int, typer.Option(min=2, metavar="N", help="Rows and columns.")] = 21,
-    pictures: Annotated[bool, typer.Option(help="Draw the basin.")] = True,
+    basin_y: Annotated[str, Option(metavar="NAME", help="What the rows change.")] = "",
+    reach: Annotated[float, Option(help="How far from the cycle, rad, m or per second.")] = 0.5,
+    grid: Annotated[int, Option(min=2, metavar="N", help="Rows and columns.")] = 21,
+    pictures: Annotated[bool, Option(help="Draw the basin.")] = True,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o", "--output", metavar="FOLDER", help="For gait.json, basin.csv, basin.png.", show_default=False
-        ),
+        Option("-o", "--output", metavar="FOLDER", help="For gait.json, basin.csv, basin.png.", show_default=False),
     ] = None,
     parameter: options.Parameters = None,
     skip_unsupported: options.SkipUnsupported = False,
@@ -110,7 +106,7 @@ def gait(
         files = _write(where, found, pictures) if where else []
     _told(found, files).show()
     if cycle is None:
-        raise typer.Exit(1)
+        raise SystemExit(1)
 
 
 def _check_numbers(to: float, accuracy: float, reach: float, perturb: Sequence[float], seed: int) -> None:

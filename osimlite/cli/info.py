@@ -8,8 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
+from osimlite.cli._command import Argument, Option, command
 from osimlite.text import counted
 
 if TYPE_CHECKING:
@@ -17,9 +16,10 @@ if TYPE_CHECKING:
     from osimlite.schema.model import Model
 
 
+@command
 def info(
-    file: Annotated[Path, typer.Argument(help="A model, a setup or a table.", show_default=False)],
-    everything: Annotated[bool, typer.Option("--all", help="List every class, or every column of a table.")] = False,
+    file: Annotated[Path, Argument(help="A model, a setup or a table.", show_default=False)],
+    everything: Annotated[bool, Option("--all", help="List every class, or every column of a table.")] = False,
 ) -> None:
     """Show what is in a model: versions, mass, bodies, joints, coordinates, muscles, and how many of each class.
 
@@ -146,13 +146,13 @@ def _classes(objects: Sequence[Object], everything: bool) -> None:
 
 def _listed(title: str, items: Sequence[str], everything: bool) -> None:
     """Print some items, or the first of them."""
-    from osimlite.cli._console import plain_console, say, show
+    from osimlite.cli._console import columns, say, show
     from osimlite.text import visible
 
     shown = items if everything else items[:15]
     # The words of an item stay together.
     text = f"{title}: " + ", ".join(visible(item).replace(" ", "\0") for item in shown)
-    lines = textwrap.fill(text, plain_console().width, subsequent_indent="  ", break_long_words=False)
+    lines = textwrap.fill(text, columns(), subsequent_indent="  ", break_long_words=False)
     show("\n" + lines.replace("\0", " ") + "\n")
     if len(items) > len(shown):
         say(f"and {len(items) - len(shown)} more (--all lists them)")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from osimlite.cli import _options as options
+from osimlite.cli._command import Option, command
 
 
+@command
 def inverse_dynamics(
     file: options.File,
     motion: options.Motion,
@@ -18,7 +18,7 @@ def inverse_dynamics(
     wrapping: options.Wrapping = "opensim",
     exclude: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             metavar="NAME",
             help="What does not push: a force, a group, All, Actuators or Muscles; Muscles if left out.",
             show_default=False,

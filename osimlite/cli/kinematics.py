@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from osimlite.cli import _options as options
+from osimlite.cli._command import Option, command
 
 
+@command
 def kinematics(
     file: options.File,
     motion: options.Motion,
     output: options.Folder = None,
     assemble: Annotated[
-        bool, typer.Option("--assemble", help="Change each pose as little as the model's constraints demand first.")
+        bool, Option("--assemble", help="Change each pose as little as the model's constraints demand first.")
     ] = False,
     lowpass: options.Lowpass = None,
-    trc: Annotated[bool, typer.Option("--trc", help="Write the markers as markers.trc too.")] = False,
+    trc: Annotated[bool, Option("--trc", help="Write the markers as markers.trc too.")] = False,
 ) -> None:
     """Follow a recorded motion: writes bodies.sto and markers.sto.
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
+from osimlite.cli._command import Option, command
 
 
+@command
 def lsp(
     stdio: Annotated[
-        bool, typer.Option("--stdio", help="Speak over standard input and output: what it does in any case.")
+        bool, Option("--stdio", help="Speak over standard input and output: what it does in any case.")
     ] = True,
 ) -> None:
     """Serve an editor: findings while you type, completion, hover, definitions, renaming, mends, outline, formatting.

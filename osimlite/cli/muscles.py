@@ -6,20 +6,20 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from osimlite.cli import _options as options
+from osimlite.cli._command import Option, command
 
 if TYPE_CHECKING:
     from osimlite.multibody.mechanism import Mechanism
     from osimlite.simulation.muscle_curves import MuscleCurves
 
 
+@command
 def muscles(
     file: options.File,
     coordinate: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             "--coordinate",
             metavar="NAME[=LOW:HIGH]",
             help="Sweep a coordinate (rad, m, or -120deg:0), over its range if no other is given; twice: two at once.",
@@ -28,24 +28,24 @@ def muscles(
     ] = None,
     muscle: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             "--muscle", metavar="NAME", help="Only this one; may be repeated.", show_default="all that move with it"
         ),
     ] = None,
     points: Annotated[
         int | None,
-        typer.Option(min=2, help="How many values of each coordinate.", show_default="50, of two coordinates 15"),
+        Option(min=2, help="How many values of each coordinate.", show_default="50, of two coordinates 15"),
     ] = None,
-    activation: Annotated[float, typer.Option(help="Of all muscles, 0 to 1.")] = 1.0,
+    activation: Annotated[float, Option(help="Of all muscles, 0 to 1.")] = 1.0,
     wrapping: options.Wrapping = "opensim",
     compare: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Another model, side by side: scaled, or converted.", show_default=False),
+        Option(metavar="FILE", help="Another model, side by side: scaled, or converted.", show_default=False),
     ] = None,
-    plot: Annotated[bool, typer.Option("--plot", help="Draw every quantity: PNG files beside the table.")] = False,
+    plot: Annotated[bool, Option("--plot", help="Draw every quantity: PNG files beside the table.")] = False,
     output: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "-o", "--output", metavar="FILE", help="Write all numbers: .csv or .parquet, SI units.", show_default=False
         ),
     ] = None,

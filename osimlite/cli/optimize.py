@@ -5,21 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
+from osimlite.cli._command import Option, command
 from osimlite.cli._console import Facts
 
 if TYPE_CHECKING:
     from osimlite.sweep.optimize import Optimum
 
 
+@command
 def optimize(
     source: options.Source,
     objective: Annotated[
         str,
-        typer.Option(
+        Option(
             metavar="NAME",
             help="What is wanted: distance, steps, progress, time_to_fall (the more, the better), largest_force, "
             "scuffs, energy, an expression such as 'max(pelvis_Y)', or module:function (the less, the better).",
@@ -27,38 +27,36 @@ def optimize(
         ),
     ],
     vary: sweeping.Vary = None,
-    budget: Annotated[int, typer.Option(metavar="N", help="How many runs are allowed.")] = 1000,
+    budget: Annotated[int, Option(metavar="N", help="How many runs are allowed.")] = 1000,
     method: Annotated[
-        str, typer.Option(help="cma, sobol-cma (for a few hundred runs), differential-evolution or nelder-mead.")
+        str, Option(help="cma, sobol-cma (for a few hundred runs), differential-evolution or nelder-mead.")
     ] = "cma",
     popsize: Annotated[
-        int | None, typer.Option(metavar="N", help="Runs between two decisions.", show_default="what suits the method")
+        int | None, Option(metavar="N", help="Runs between two decisions.", show_default="what suits the method")
     ] = None,
     sigma: Annotated[
         float,
-        typer.Option(help="How far from where it begins the method looks at first, as a fraction of the ranges."),
+        Option(help="How far from where it begins the method looks at first, as a fraction of the ranges."),
     ] = 0.25,
-    seed: Annotated[int, typer.Option(help="The same seed, the same search.")] = 0,
+    seed: Annotated[int, Option(help="The same seed, the same search.")] = 0,
     start: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             metavar="FOLDER",
             help="Begin at what another search found, of variables that have the same names.",
             show_default="where the model is",
         ),
     ] = None,
     maximize: Annotated[
-        bool | None, typer.Option("--maximize/--minimize", help="What is better.", show_default="see --objective")
+        bool | None, Option("--maximize/--minimize", help="What is better.", show_default="see --objective")
     ] = None,
-    unbounded: Annotated[
-        bool, typer.Option("--unbounded", help="The ranges say where to begin, and may be left.")
-    ] = False,
+    unbounded: Annotated[bool, Option("--unbounded", help="The ranges say where to begin, and may be left.")] = False,
     tolerance: Annotated[
-        float | None, typer.Option(help="At which the search has converged.", show_default="that of the method")
+        float | None, Option(help="At which the search has converged.", show_default="that of the method")
     ] = None,
     measure: Annotated[
         list[str] | None,
-        typer.Option("--measure", metavar="NAME", help="What else to keep in the history.", show_default=False),
+        Option("--measure", metavar="NAME", help="What else to keep in the history.", show_default=False),
     ] = None,
     to: options.To = 2.0,
     engine: options.Engine = "compiled",
@@ -74,10 +72,10 @@ def optimize(
     workers: sweeping.Workers = None,
     cluster: sweeping.Cluster = None,
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FOLDER", help="For history.parquet, best.osim, summary.json.")
+        Path, Option("-o", "--output", metavar="FOLDER", help="For history.parquet, best.osim, summary.json.")
     ] = Path("optimum"),
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted or finished search.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace what another search found.")] = False,
+    resume: Annotated[bool, Option("--resume", help="Go on with an interrupted or finished search.")] = False,
+    force: Annotated[bool, Option("--force", help="Replace what another search found.")] = False,
     controls: options.Controls = None,
     interpolation: sweeping.Interpolation = "linear",
     equilibrate: options.Equilibrate = False,

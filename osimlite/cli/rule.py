@@ -7,13 +7,14 @@ import sys
 import textwrap
 from typing import Annotated
 
-import typer
+from osimlite.cli._command import Argument, command
 
 
+@command
 def rule(
     code: Annotated[
         str | None,
-        typer.Argument(
+        Argument(
             help="Code or name of a rule; the beginning of codes (OSIM8) or a family (data) lists several.",
             show_default=False,
         ),

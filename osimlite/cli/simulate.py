@@ -6,9 +6,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from osimlite.cli import _options as options
+from osimlite.cli._command import Option, command
 from osimlite.cli._console import Facts, complain
 from osimlite.cli._progress import motion_bar, progress_bar
 
@@ -19,6 +18,7 @@ LIVE_STEP = 1e-3
 """Step of what the window shows if none is given, s."""
 
 
+@command
 def simulate(
     file: options.File,
     to: options.To = 2.0,
@@ -27,7 +27,7 @@ def simulate(
     integrator: options.Integrator = None,
     fixed_step: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", help="Steps of this length (semi-implicit Euler), without error control."),
+        Option(metavar="SECONDS", help="Steps of this length (semi-implicit Euler), without error control."),
     ] = None,
     start: options.Start = None,
     start_speed: options.StartSpeed = None,
@@ -35,21 +35,21 @@ def simulate(
     controls: options.Controls = None,
     states: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             metavar="FILE", help="Start from the last row of a file of states; --set says more.", show_default=False
         ),
     ] = None,
     report_interval: Annotated[
-        float, typer.Option(metavar="SECONDS", help="Time between the rows of the result files.")
+        float, Option(metavar="SECONDS", help="Time between the rows of the result files.")
     ] = 0.01,
     output: options.Folder = None,
     plot: Annotated[
-        bool, typer.Option("--plot", help="Draw coordinates, muscles, forces, probes and energy as PNG.")
+        bool, Option("--plot", help="Draw coordinates, muscles, forces, probes and energy as PNG.")
     ] = False,
-    animate: Annotated[bool, typer.Option("--animate", help="Draw the motion as animation.gif.")] = False,
+    animate: Annotated[bool, Option("--animate", help="Draw the motion as animation.gif.")] = False,
     gui: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--gui",
             help="Show it live in PyBullet's window, until you press Escape there (space stops it meanwhile); takes "
             "fixed steps.",
@@ -59,10 +59,10 @@ def simulate(
     skip_unsupported: options.SkipUnsupported = False,
     opensim_derivatives: Annotated[
         bool,
-        typer.Option("--opensim-derivatives", help="Repeat OpenSim's mistakes in joints with several turns."),
+        Option("--opensim-derivatives", help="Repeat OpenSim's mistakes in joints with several turns."),
     ] = False,
     rolling: Annotated[
-        bool, typer.Option("--rolling", help="Let rolling constraints act, which OpenSim leaves off.")
+        bool, Option("--rolling", help="Let rolling constraints act, which OpenSim leaves off.")
     ] = False,
     external_loads: options.ExternalLoads = None,
 ) -> None:
@@ -129,7 +129,7 @@ def simulate(
             _told(trajectory, _write(trajectory, results)).show()
             if is_failure:
                 raise
-            raise typer.Exit(130) from None
+            raise SystemExit(130) from None
 
         def film(path: Path) -> Path:
             from osimlite.view.animation import animate as draw

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
+from osimlite.cli._command import Option, command
 from osimlite.cli._console import Facts, complain
 
 if TYPE_CHECKING:
@@ -16,23 +15,22 @@ if TYPE_CHECKING:
     from osimlite.sweep.run import Outcome
 
 
+@command
 def sweep(
     source: options.Source,
     vary: sweeping.Vary = None,
     samples: Annotated[
         int | None,
-        typer.Option("--samples", metavar="N", help="How many runs; leave it out for a grid.", show_default=False),
+        Option("--samples", metavar="N", help="How many runs; leave it out for a grid.", show_default=False),
     ] = None,
     sampler: Annotated[
         str | None,
-        typer.Option(
-            help="'grid', 'random', 'sobol' or 'lhs'.", show_default="grid if every range has a COUNT, else sobol"
-        ),
+        Option(help="'grid', 'random', 'sobol' or 'lhs'.", show_default="grid if every range has a COUNT, else sobol"),
     ] = None,
-    seed: Annotated[int, typer.Option(help="The same seed, the same random samples.")] = 0,
+    seed: Annotated[int, Option(help="The same seed, the same random samples.")] = 0,
     measure: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             "--measure",
             metavar="NAME",
             help="What to keep of a run: distance, energy, largest_force, steps, scuffs, progress, time_to_fall, "
@@ -54,10 +52,10 @@ def sweep(
     workers: sweeping.Workers = None,
     cluster: sweeping.Cluster = None,
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE", help="Parquet file to write, one row for each run.")
+        Path, Option("-o", "--output", metavar="FILE", help="Parquet file to write, one row for each run.")
     ] = Path("results.parquet"),
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted sweep.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace results that were made with other settings.")] = False,
+    resume: Annotated[bool, Option("--resume", help="Go on with an interrupted sweep.")] = False,
+    force: Annotated[bool, Option("--force", help="Replace results that were made with other settings.")] = False,
     controls: options.Controls = None,
     interpolation: sweeping.Interpolation = "linear",
     equilibrate: options.Equilibrate = False,
@@ -88,7 +86,7 @@ def sweep(
     _told(plan, outcome).show()
     if outcome.status["failed"] == outcome.count:
         complain("every run failed")
-        raise typer.Exit(1)
+        raise SystemExit(1)
 
 
 def _told(plan: Plan, outcome: Outcome) -> Facts:

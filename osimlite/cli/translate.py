@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from osimlite.cli import _options as options
+from osimlite.cli._command import Option, command
 from osimlite.cli._console import add_row, plain_console, plain_table, say
 from osimlite.text import listed
 
@@ -19,14 +18,15 @@ if TYPE_CHECKING:
     from osimlite.translate.mjcf.export import Mjcf
 
 
+@command
 def translate(
     file: options.File,
-    to: Annotated[str, typer.Option("--to", help="The format: 'urdf', or 'mjcf' for MuJoCo.")] = "urdf",
+    to: Annotated[str, Option("--to", help="The format: 'urdf', or 'mjcf' for MuJoCo.")] = "urdf",
     output: options.Folder = None,
     geometry: options.Geometry = None,
     limits: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="'range' writes coordinate ranges as hard limits, which they are not in OpenSim.",
             show_default="none",
             rich_help_panel="URDF",
@@ -34,13 +34,11 @@ def translate(
     ] = None,
     merge: Annotated[
         bool | None,
-        typer.Option(
-            "--merge", help="Make bodies that do not move relative to each other one link.", rich_help_panel="URDF"
-        ),
+        Option("--merge", help="Make bodies that do not move relative to each other one link.", rich_help_panel="URDF"),
     ] = None,
     collision: Annotated[
         bool | None,
-        typer.Option(
+        Option(
             "--collision",
             help="Write contact geometry as collision shapes (a half space as a large box).",
             rich_help_panel="URDF",
@@ -48,7 +46,7 @@ def translate(
     ] = None,
     effort: Annotated[
         float | None,
-        typer.Option(
+        Option(
             help="Greatest force (N, N m) of joints whose coordinate has no actuators that limit it.",
             show_default="no limit",
             rich_help_panel="URDF",
@@ -56,14 +54,14 @@ def translate(
     ] = None,
     velocity: Annotated[
         float | None,
-        typer.Option(help="Greatest rate (m/s, rad/s) of all joints.", show_default="no limit", rich_help_panel="URDF"),
+        Option(help="Greatest rate (m/s, rad/s) of all joints.", show_default="no limit", rich_help_panel="URDF"),
     ] = None,
     mujoco: Annotated[
-        int | None, typer.Option(help="The version to write for, 3 or 4.", show_default="4", rich_help_panel="MJCF")
+        int | None, Option(help="The version to write for, 3 or 4.", show_default="4", rich_help_panel="MJCF")
     ] = None,
     contact: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="'native' writes contact forces as contacts of MuJoCo's own law, 'none' leaves them out.",
             show_default="native",
             rich_help_panel="MJCF",
@@ -71,7 +69,7 @@ def translate(
     ] = None,
     fit: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="'wraps' fits what tendons go around to the paths, 'force' muscles too (up to a minute).",
             show_default="none",
             rich_help_panel="MJCF",
@@ -79,7 +77,7 @@ def translate(
     ] = None,
     check: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             metavar="MJCF",
             help="Translate nothing, but measure this file, by whatever program, against the model (needs MuJoCo).",
             show_default=False,
@@ -88,7 +86,7 @@ def translate(
     ] = None,
     spline: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="What joints follow that move by splines: a 'quartic', or 'series': a quartic of a quartic.",
             show_default="series",
             rich_help_panel="MJCF",
@@ -96,7 +94,7 @@ def translate(
     ] = None,
     driver: Annotated[
         bool | None,
-        typer.Option(
+        Option(
             "--driver",
             help="Write what osimlite.mjcf.Driver moves by OpenSim's own laws: the file itself has no forces.",
             rich_help_panel="MJCF",

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from osimlite.cli import _options as options
+from osimlite.cli._command import Argument, Option, command
 from osimlite.cli._console import add_row, plain_console, plain_table, say
 from osimlite.text import counted
 
@@ -16,11 +15,12 @@ if TYPE_CHECKING:
     from osimlite.document.upgrade import Change
 
 
+@command
 def upgrade(
-    file: Annotated[Path, typer.Argument(help="A model, setup or other document of any version.", show_default=False)],
+    file: Annotated[Path, Argument(help="A model, setup or other document of any version.", show_default=False)],
     output: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "-o",
             "--output",
             metavar="FILE",

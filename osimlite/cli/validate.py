@@ -4,70 +4,66 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from osimlite.cli import _options as options
+from osimlite.cli._command import Argument, Option, command
 
 
+@command
 def validate(
     paths: Annotated[
         list[str],
-        typer.Argument(
+        Argument(
             metavar="PATH...",
             help="Files (.osim, .xml, .omoco, .sto, .mot, .trc), folders, or - for standard input.",
             show_default=False,
         ),
     ],
     format: Annotated[
-        str, typer.Option("--format", metavar="FORMAT", help="full, concise, json, github, sarif or junit.")
+        str, Option("--format", metavar="FORMAT", help="full, concise, json, github, sarif or junit.")
     ] = "full",
     select: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             metavar="RULE", help="Run only these rules: codes, beginnings of codes (OSIM3), names.", show_default=False
         ),
     ] = None,
     ignore: Annotated[
         list[str] | None,
-        typer.Option(metavar="RULE", help="Leave these rules out; as for --select.", show_default=False),
+        Option(metavar="RULE", help="Leave these rules out; as for --select.", show_default=False),
     ] = None,
     fail_on: Annotated[
         str | None,
-        typer.Option(
-            metavar="SEVERITY", help="What makes the exit code 1: error, warning or info.", show_default=False
-        ),
+        Option(metavar="SEVERITY", help="What makes the exit code 1: error, warning or info.", show_default=False),
     ] = None,
-    fix: Annotated[bool, typer.Option("--fix", help="Mend what can be mended with certainty.")] = False,
+    fix: Annotated[bool, Option("--fix", help="Mend what can be mended with certainty.")] = False,
     unsafe_fixes: Annotated[
-        bool, typer.Option("--unsafe-fixes", help="Mend also what was probably meant; look at it with --diff first.")
+        bool, Option("--unsafe-fixes", help="Mend also what was probably meant; look at it with --diff first.")
     ] = False,
-    diff: Annotated[bool, typer.Option("--diff", help="Show the mends and write nothing.")] = False,
+    diff: Annotated[bool, Option("--diff", help="Show the mends and write nothing.")] = False,
     baseline: Annotated[
-        str | None, typer.Option(help="Say nothing of the findings in this file.", metavar="FILE", show_default=False)
+        str | None, Option(help="Say nothing of the findings in this file.", metavar="FILE", show_default=False)
     ] = None,
     write_baseline: Annotated[
-        str | None, typer.Option(help="Write all findings to this file and stop.", metavar="FILE", show_default=False)
+        str | None, Option(help="Write all findings to this file and stop.", metavar="FILE", show_default=False)
     ] = None,
     geometry: options.Geometry = None,
     classes: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="FILE", help="A file that declares classes of a plug-in; may be repeated.", show_default=False
-        ),
+        Option(metavar="FILE", help="A file that declares classes of a plug-in; may be repeated.", show_default=False),
     ] = None,
     target_version: Annotated[
         str,
-        typer.Option(
+        Option(
             metavar="RELEASE", help="The OpenSim that is to read the files: 4.0 to 4.6 (OSIM113).", show_default="4.6"
         ),
     ] = "",
     everything: Annotated[
-        bool, typer.Option("--all", help="Print every finding; else the first stands for those that are like it.")
+        bool, Option("--all", help="Print every finding; else the first stands for those that are like it.")
     ] = False,
-    statistics: Annotated[bool, typer.Option("--statistics", help="Count findings by rule instead.")] = False,
+    statistics: Annotated[bool, Option("--statistics", help="Count findings by rule instead.")] = False,
     stdin_filename: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="FILE",
             help="Take standard input for what this file will be, and check it there.",
             show_default=False,
@@ -75,7 +71,7 @@ def validate(
     ] = None,
     only_ours: options.OnlyOurs = False,
     no_cache: Annotated[
-        bool, typer.Option("--no-cache", help="Check every file, also those that have not changed since.")
+        bool, Option("--no-cache", help="Check every file, also those that have not changed since.")
     ] = False,
 ) -> None:
     """Say what is wrong with models, setups and tables: all in one run, with line, column and nearest spelling.
@@ -86,7 +82,7 @@ def validate(
     """
     from osimlite.cli._validating import run
 
-    raise typer.Exit(
+    raise SystemExit(
         run(
             paths,
             format=format,

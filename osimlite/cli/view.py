@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from osimlite.cli import _options as options
+from osimlite.cli._command import Argument, Option, command
 
 if TYPE_CHECKING:
     from osimlite.view.shown import Shown
@@ -17,18 +16,17 @@ SIZE = (1200, 900)
 """Width and height of a screenshot, pixels."""
 
 
+@command
 def view(
     file: options.File,
-    motion: Annotated[
-        Path | None, typer.Argument(help="Coordinates over time, .sto or .mot.", show_default=False)
-    ] = None,
+    motion: Annotated[Path | None, Argument(help="Coordinates over time, .sto or .mot.", show_default=False)] = None,
     values: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Where a coordinate is (rad, m, or 30deg)."),
+        Option("--set", metavar="NAME=VALUE", help="Where a coordinate is (rad, m, or 30deg)."),
     ] = None,
     forces: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             metavar="FILE",
             help="Contact forces over time, labelled as by OpenSim's ForceReporter.",
             show_default="computed, if the motion has speeds",
@@ -38,27 +36,27 @@ def view(
     geometry: options.Geometry = None,
     page: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "--html", metavar="FILE", help="Write one page that needs no server and no network.", show_default=False
         ),
     ] = None,
     glb: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write a file for Blender, slides and web pages (glTF).", show_default=False),
+        Option(metavar="FILE", help="Write a file for Blender, slides and web pages (glTF).", show_default=False),
     ] = None,
     rerun: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write a recording for the Rerun viewer (.rrd).", show_default=False),
+        Option(metavar="FILE", help="Write a recording for the Rerun viewer (.rrd).", show_default=False),
     ] = None,
     screenshot: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write a picture (.png); needs no display.", show_default=False),
+        Option(metavar="FILE", help="Write a picture (.png); needs no display.", show_default=False),
     ] = None,
     at: Annotated[
         float | None,
-        typer.Option("--at", metavar="SECONDS", help="The moment of the screenshot.", show_default="the first"),
+        Option("--at", metavar="SECONDS", help="The moment of the screenshot.", show_default="the first"),
     ] = None,
-    port: Annotated[int, typer.Option(help="Serve the page at this port.", show_default="any that is free")] = 0,
+    port: Annotated[int, Option(help="Serve the page at this port.", show_default="any that is free")] = 0,
     browser: options.Browser = True,
 ) -> None:
     """Look at a model, and at a motion: bodies, contacts, muscles, the component tree, a slider for every coordinate.

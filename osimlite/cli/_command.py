@@ -1,0 +1,177 @@
+"""What a command takes, as its function declares it: read by typer, or here, which is quicker.
+
+Typer makes the help, the completion and the messages about what is wrong. Words of which nothing is wrong need none of
+it, and loading it takes longer than most commands do.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import UnionType
+from typing import Any, NamedTuple, get_args, get_origin
+
+_NUMBERS = {int: re.compile(r"[0-9]+", re.ASCII), float: re.compile(r"[0-9]*\.?[0-9]+(e[-+]?[0-9]+)?", re.ASCII)}
+"""Texts of numbers that mean the same to everybody."""
+
+
+class Declared:
+    """What stands in the annotation of a parameter of a command.
+
+    Attributes:
+        maker: "Option" or "Argument" of typer.
+        names: under which an option is given; else the parameter's own.
+        told: the keyword arguments of typer's function.
+    """
+
+    __slots__ = "maker", "names", "told"
+
+    def __init__(self, maker: str, names: Sequence[str], told: dict[str, Any]) -> None:
+        self.maker, self.names, self.told = maker, names, told
+
+
+def Option(*names: str, **told: Any) -> Declared:
+    """An option, with what ``typer.Option`` takes."""
+    return Declared("Option", names, told)
+
+
+def Argument(**told: Any) -> Declared:
+    """An argument, with what ``typer.Argument`` takes."""
+    return Declared("Argument", (), told)
+
+
+class _Parameter(NamedTuple):
+    name: str
+    type: Any
+    declared: Declared
+    default: Any
+
+    @property
+    def spellings(self) -> dict[str, Any]:
+        """What may stand on the command line for it, and what that says of a switch."""
+        names = self.declared.names
+        if not any(name.startswith("--") for name in names):
+            names = (*names, f"--{self.name.replace('_', '-')}")
+            if self.type is bool:
+                names = (*names[:-1], f"{names[-1]}/--no-{names[-1][2:]}")
+        found = {}
+        for name in names:
+            yes, _, no = name.partition("/")
+            found[yes] = True
+            if no:
+                found[no] = False
+        return found
+
+    def scalar(self) -> tuple[Any, bool]:
+        """The type of one value, and whether there may be several."""
+        kinds = [kind for kind in get_args(self.type) if kind is not type(None)]
+        kind = kinds[0] if get_origin(self.type) is UnionType else self.type
+        return (get_args(kind)[0], True) if get_origin(kind) is list else (kind, False)
+
+    def value(self, kind: Any, word: str) -> Any:
+        """What a word means; None where typer has to say."""
+        if kind is str or kind is Path:
+            return kind(word)
+        if kind not in _NUMBERS or not _NUMBERS[kind].fullmatch(word):
+            return None
+        value = kind(word)
+        return None if value < self.declared.told.get("min", value) else value
+
+
+class Command:
+    """A function that is a command."""
+
+    def __init__(self, function: Callable[..., None]) -> None:
+        self.function = function
+        self.__name__, self.__doc__, self.__module__ = function.__name__, function.__doc__, function.__module__
+
+    def __call__(self, *values: Any, **named: Any) -> None:
+        self.function(*values, **named)
+
+    def parameters(self) -> list[_Parameter]:
+        """What the command takes, in the order of its help."""
+        function: Any = self.function
+        defaults = dict(zip(reversed([*_names(function)]), reversed(function.__defaults__ or ()), strict=False))
+        found = []
+        for name in _names(function):
+            annotation = eval(function.__annotations__[name], function.__globals__)
+            kind, declared = annotation.__origin__, annotation.__metadata__[0]
+            found.append(_Parameter(name, kind, declared, defaults.get(name, ...)))
+        return found
+
+    @property
+    def __annotations__(self) -> dict[str, Any]:  # type: ignore[override]
+        return {each.name: each.type for each in self.parameters()}
+
+    @property
+    def __signature__(self) -> Any:
+        """What typer reads."""
+        from inspect import Parameter, Signature
+        from typing import Annotated
+
+        import typer
+
+        made = []
+        for name, kind, declared, default in self.parameters():
+            info = getattr(typer, declared.maker)(*declared.names, **declared.told)
+            made.append(
+                Parameter(
+                    name,
+                    Parameter.POSITIONAL_OR_KEYWORD,
+                    default=Parameter.empty if default is ... else default,
+                    annotation=Annotated[kind, info],
+                )
+            )
+        return Signature(made)
+
+    def read(self, words: Sequence[str]) -> dict[str, Any] | None:
+        """The values that words give the parameters; None if typer has to read them."""
+        parameters = self.parameters()
+        given: dict[str, Any] = {each.name: each.default for each in parameters}
+        options = {
+            spelling: (each, says)
+            for each in parameters
+            if each.declared.maker == "Option"
+            for spelling, says in each.spellings.items()
+        }
+        places = [each for each in parameters if each.declared.maker == "Argument"]
+        seen: set[str] = set()
+        rest = iter(words)
+        for word in rest:
+            if word == "-" or not word.startswith("-"):
+                if not places:
+                    return None
+                parameter, says = places[0], True
+                kind, several = parameter.scalar()
+                if not several:
+                    places.pop(0)
+            else:
+                spelling, equals, word = word.partition("=")
+                if spelling not in options or (equals and not spelling.startswith("--")):
+                    return None
+                parameter, says = options[spelling]
+                kind, several = parameter.scalar()
+                if not equals and kind is not bool:
+                    word = next(rest, "-")
+                if word.startswith("-") or (equals and kind is bool):
+                    return None
+            value = says if kind is bool else parameter.value(kind, word)
+            if value is None or (parameter.name in seen and not several):
+                return None
+            if several:
+                given[parameter.name] = [*(given[parameter.name] if parameter.name in seen else ()), value]
+            else:
+                given[parameter.name] = value
+            seen.add(parameter.name)
+        return None if any(value is ... for value in given.values()) else given
+
+
+def _names(function: Any) -> tuple[str, ...]:
+    code = function.__code__
+    names: tuple[str, ...] = code.co_varnames[: code.co_argcount]
+    return names
+
+
+command = Command
+"""Makes a command of a function."""
