@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import cast
+from itertools import chain
+from typing import NamedTuple, cast
 
 from osimlite.lint.subject import Subject, once
+from osimlite.multibody.topology import new_base, spanning_tree
 from osimlite.schema.base import Component, Object, Unknown
+from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.frames import Body, Ground, StationDefinedFrame
-from osimlite.schema.joints import Joint
+from osimlite.schema.joints import Joint, WeldJoint
 
 
 @dataclass(slots=True)
@@ -61,12 +64,84 @@ class Skeleton:
         return [link for link in self.links if base is link.parent_base or base is link.child_base]
 
 
+class _Edge(NamedTuple):
+    """A joint as the tree of bodies is grown from it, or one to ground that OpenSim adds; bodies by their paths."""
+
+    parent: str
+    child: str
+    coordinates: tuple[int, ...] = (0,)
+    link: Link | None = None
+
+
+class Growth(NamedTuple):
+    """How OpenSim makes a tree of the bodies of a skeleton.
+
+    Attributes:
+        loops: the joints that close loops, in the order of the joints.
+        fails: whether it refuses the model, or crashes, for the bodies that no joint connects to ground. It gives each
+            of them, or one of each group, a joint to ground. With each joint that it makes it forgets the order of all
+            joints before, which it then adds to the system last, in the order of the document: too late for offset
+            frames, and for joints, on the bodies that they carry.
+    """
+
+    loops: list[Link]
+    fails: bool
+
+
+@once
+def growth(subject: Subject) -> Growth:
+    """What OpenSim does with a skeleton, as far as its joints lead anywhere."""
+    bones = skeleton(subject)
+    ground, masses = subject.path(bones.ground), {subject.path(body): body.mass for body in bones.bodies}
+    edges = [
+        # OpenSim asks an empty joint of the class how many coordinates it has.
+        _Edge(subject.path(parent), subject.path(child), () if _has_none(link.joint) else (0,), link)
+        for link, parent, child in bones.pairs()
+    ]
+    joined = {path for edge in edges for path in edge[:2]}
+    edges += [_Edge(ground, path) for path in masses if path not in joined]
+    order: dict[str, _Edge] = {}
+    while True:
+        branches, loops = spanning_tree(edges, ground, masses)
+        for branch in branches:
+            order.setdefault(branch.outer, branch.link)
+        loose = [path for path in masses if path not in order]
+        if not loose:
+            break
+        edges.append(_Edge(ground, new_base(loose, edges)))
+    closing = [edge.link for edge in loops if edge.link is not None]
+    return Growth(closing, any(edge.link is None for edge in edges) and _fails(subject, edges, order))
+
+
+def _fails(subject: Subject, edges: list[_Edge], order: dict[str, _Edge]) -> bool:
+    paths = [*order]
+    last = max(place for place, edge in enumerate(order.values()) if edge.link is None)
+    late = {*paths[:last]}
+    frames = chain(subject.named("PhysicalOffsetFrame"), subject.named("StationDefinedFrame"))
+    framed = {subject.path(base) for frame in frames if (base := base_of(subject, frame)) is not None}
+    if not late.isdisjoint(framed) or any(not late.isdisjoint(order[path][:2]) for path in paths[last:]):
+        return True
+    carried = {id(edge): path for path, edge in order.items() if path in late}
+    for edge in edges:
+        if (outer := carried.get(id(edge))) is not None:
+            if (edge.parent if outer == edge.child else edge.child) in late:
+                return True
+            late.remove(outer)
+    return False
+
+
+def _has_none(joint: Joint) -> bool:
+    return isinstance(joint, WeldJoint | CustomJoint)
+
+
 @once
 def skeleton(subject: Subject) -> Skeleton:
     """The skeleton of a model."""
     assert subject.model is not None
     bones = Skeleton([*subject.each(Body)], subject.model.ground)
-    for joint in subject.each(Joint):
+    for joint in subject.tree.components:
+        if not isinstance(joint, Joint):
+            continue
         parent = subject.target_of(joint, "socket_parent_frame")
         child = subject.target_of(joint, "socket_child_frame")
         bones.links.append(Link(joint, parent, child, base_of(subject, parent), base_of(subject, child)))

@@ -26,7 +26,7 @@ from osimlite.multibody.schema_frames import Placements
 from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.schema_joints import joint_motions, unknown_joint
 from osimlite.multibody.spatial import Array
-from osimlite.multibody.topology import spanning_tree
+from osimlite.multibody.topology import new_base, spanning_tree
 from osimlite.schema import constraints as schema
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.coordinates import Coordinate
@@ -45,7 +45,8 @@ def build_mechanism(model: Model, *, opensim_derivatives: bool = False, rolling:
 
     Where a joint closes a loop, a WeldJoint becomes a constraint; for any other joint its child body is split into
     halves, one of which the joint carries, and the halves are welded by a constraint. (OpenSim 4.6 does the same, but
-    then counts the child of the WeldJoint twice, and gives the half a wrong inertia.) Forces and geometry play no part.
+    then counts the child of the WeldJoint twice, and gives the half a wrong inertia: so it is with
+    `opensim_derivatives`.) Forces and geometry play no part.
 
     Args:
         model: the model.
@@ -199,7 +200,7 @@ class _Builder:
             loose = [path for path in self.bodies if path not in index]
             if not loose:
                 break
-            edges.append(self._free(_base(loose, edges), ground))
+            edges.append(self._free(new_base(loose, edges), ground))
         bodies = []
         for edge, outer, backward in branches:
             carrier, mobilizer = edge.child if backward else edge.parent, edge.mobilizer(reversed=backward)
@@ -210,6 +211,11 @@ class _Builder:
                 first = FramePlacement(index[edge.parent], edge.parent_frame)
                 second = FramePlacement(index[edge.child], edge.child_frame)
                 self.constraints.append(WeldConstraint(first, second, edge.path))
+                if self.opensim_derivatives:
+                    twice = mass_properties(self.bodies[edge.child], edge.child)
+                    carried = edge.mobilizer(reversed=False)
+                    path = f"{edge.child}_again{len(bodies)}"
+                    bodies.append(MobileBody(_last(path), path, index[edge.parent], twice, carried))
             elif edge.child == ground or edge.kind == "FreeJoint":
                 raise UnsupportedError(
                     f"the joint '{edge.path}' closes a loop through '{edge.parent}' and '{edge.child}', "
@@ -236,8 +242,12 @@ class _Builder:
         path = f"{edge.child}_part{len(parts)}"
         bodies.append(MobileBody(_last(path), path, index[edge.parent], whole, edge.mobilizer(reversed=False)))
         parts.append(len(bodies) - 1)
+        share = whole.share(len(parts))
         for part in parts:
-            bodies[part] = replace(bodies[part], mass_properties=whole.share(len(parts)))
+            # OpenSim gives its parts, but for the body itself, the inertia about the origin of 1 kg of the body.
+            wrong = self.opensim_derivatives and part != place
+            inertia = whole.about_origin() / whole.mass if wrong and whole.mass else share.inertia
+            bodies[part] = replace(bodies[part], mass_properties=replace(share, inertia=inertia))
         still = np.eye(4)
         weld = WeldConstraint(FramePlacement(place, still), FramePlacement(len(bodies) - 1, still), edge.path)
         self.constraints.append(weld)
@@ -272,13 +282,6 @@ def mass_properties(body: Body, path: str) -> MassProperties:
         raise ModelError(f"the body '{path}' has a mass centre or inertia that is not finite; give numbers")
     # OpenSim lets a body without mass have no inertia either.
     return MassProperties(mass, center, inertia if mass > np.finfo(float).eps else np.zeros((3, 3)))
-
-
-def _base(loose: list[str], edges: list[_Edge]) -> str:
-    """The body of a group without ground that OpenSim connects to it: rather no child, then parent of the most."""
-    children = {edge.child for edge in edges}
-    parents = [edge.parent for edge in edges]
-    return max(loose, key=lambda path: (path not in children, parents.count(path)))
 
 
 def _last(path: str) -> str:

@@ -24,6 +24,11 @@ class MassProperties:
     center: Array = field(default_factory=lambda: np.zeros(3))
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
+    def about_origin(self) -> Array:
+        """The inertia about the origin of the body (3, 3), kg m^2."""
+        c = self.center
+        return self.inertia + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
+
     def share(self, count: int) -> MassProperties:
         """One of `count` equal parts that lie on each other."""
         return MassProperties(self.mass / count, self.center, self.inertia / count)

@@ -36,6 +36,13 @@ class Branch(NamedTuple, Generic[L]):
     reversed: bool
 
 
+def new_base(loose: Sequence[str], links: Sequence[Link]) -> str:
+    """The body of groups without ground that OpenSim connects to it: rather no child, then parent of the most."""
+    children = {link.child for link in links}
+    parents = [link.parent for link in links]
+    return max(loose, key=lambda path: (path not in children, parents.count(path)))
+
+
 def spanning_tree(links: Sequence[L], ground: str, masses: Mapping[str, float]) -> tuple[list[Branch[L]], list[L]]:
     """The joints that carry bodies, carriers before the carried, and those that only close loops.
 

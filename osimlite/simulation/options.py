@@ -61,7 +61,7 @@ class Options:
         wrapping: how paths bend around surfaces: as in "opensim", or along a "geodesic": smooth, the shortest way (or
             where a side is asked for at least a stationary one), with all surfaces of a path taken together, so that
             speed and moment arms are derivatives of the length.
-        opensim_derivatives: compute two second derivatives as OpenSim does, which are wrong; see
+        opensim_derivatives: compute two second derivatives, and masses in loops of joints, as OpenSim does, wrong; see
             :func:`osimlite.multibody.build_mechanism`.
         rolling: let every RollingOnSurfaceConstraint act, which OpenSim leaves off until a program turns them on.
         external_loads: a file of ExternalLoads: measured forces over time that act too.

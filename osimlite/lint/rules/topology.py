@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 
 from osimlite.lint.engine import ERROR, WARNING, Found, rule
-from osimlite.lint.skeleton import Skeleton, has_unknown_joints, skeleton
+from osimlite.lint.skeleton import Link, Skeleton, growth, has_unknown_joints, skeleton
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Component, Object
+from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.frames import Body
-from osimlite.schema.joints import Joint, WeldJoint
+from osimlite.schema.joints import FreeJoint, Joint, WeldJoint
 from osimlite.text import listed
 
 
@@ -20,8 +22,9 @@ def unconnected_body(subject: Subject, found: Found) -> None:
 
     Reports bodies that no chain of joints connects to ground.
 
-    OpenSim says that it adds a free joint and then crashes, or ends with an invalid body index, as soon as the model
-    has two joints. With fewer the body falls freely, which the file does not say.
+    OpenSim adds a free joint to ground, and the body falls freely, which the file does not say (a warning). If it
+    has no mass, OpenSim refuses the model; so it does, or crashes, if an offset frame or a joint is on a body that
+    comes before the last such joint in the tree.
 
     ```xml
       <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>
@@ -45,12 +48,10 @@ def unconnected_body(subject: Subject, found: Found) -> None:
     for body in bones.bodies:
         if groups.of(body) != groups.of(bones.ground):
             loose.setdefault(groups.of(body), []).append(body)
-    # Measured on 160 random models: OpenSim fails unless the joint it adds comes before all others.
-    first = not bones.of(bones.ground) and sum(len(group) > 1 for group in loose.values()) < 2
-    alone = len(bones.links) < 2 and all(
-        link.parent is link.parent_base and link.child is link.child_base for link in bones.links
-    )
-    fate = "adds a FreeJoint to ground" if first or alone else "crashes or refuses the model"
+    if not loose:
+        return
+    massless = any(not any(body.mass for body in group) for group in loose.values())
+    fails = massless or growth(subject).fails
     for body, *others in loose.values():
         message = f"no joint connects {called(body)}"
         if others:
@@ -58,7 +59,8 @@ def unconnected_body(subject: Subject, found: Found) -> None:
             message = f"{called(body)} is not connected to ground, nor {names}, which joints connect with it"
         elif bones.of(body):
             message = f"{called(body)} is not connected to ground, only with itself"
-        found(f"{message}; OpenSim {fate}", body, attribute="name", severity=WARNING if first or alone else None)
+        fate = "adds a FreeJoint to ground" if not fails else "refuses the model"
+        found(f"{message}; OpenSim {fate}", body, attribute="name", severity=None if fails else WARNING)
 
 
 @rule("OSIM403", "closed-loop", severity=ERROR)
@@ -69,8 +71,8 @@ def closed_loop(subject: Subject, found: Found) -> None:
 
     OpenSim cuts the loop: it splits a body and welds the halves with a constraint. That adds coordinates and
     multipliers that the file does not mention, and the halves together have another mass or inertia than the body, so
-    the model moves otherwise than it says even where the loop closes. Where it does not close in the default pose,
-    OpenSim refuses the model. Say what is meant with a constraint.
+    the model moves otherwise than it says even where the loop closes. Where it does not close in the default pose, or
+    the joint is a CustomJoint, OpenSim refuses the model. Say what is meant with a constraint.
 
     ```xml
     - <WeldJoint name="strut">
@@ -83,23 +85,17 @@ def closed_loop(subject: Subject, found: Found) -> None:
     + </WeldConstraint>
     ```
     """
-    groups = _Groups()
-    moved_by: dict[int, Joint] = {}
-    pairs: set[frozenset[int]] = set()
-    for link, parent, child in skeleton(subject).pairs():
-        pair = frozenset((id(parent), id(child)))
-        if groups.of(parent) == groups.of(child) and pair not in pairs:
-            before = moved_by.get(id(child))
+    bones = skeleton(subject)
+    pairs = Counter(map(_ends, bones.links))
+    for link in growth(subject).loops:
+        if pairs[_ends(link)] == 1 and link.child_base is not None:
+            before = next((other.joint for other in bones.links if _carries(other, link)), None)
             other = f", which {called(before)} has placed already" if before is not None else ""
             found(
-                f"{called(link.joint)} closes a loop at {called(child)}{other}; "
-                "OpenSim splits a body, with inertias of its own, and adds a constraint, or refuses the model",
+                f"{called(link.joint)} closes a loop at {called(link.child_base)}{other}; {_fate_of_loop(bones, link)}",
                 link.joint,
                 tag="socket_child_frame",
             )
-        groups.join(parent, child)
-        pairs.add(pair)
-        moved_by.setdefault(id(child), link.joint)
 
 
 @rule("OSIM404", "parallel-joints", severity=ERROR)
@@ -108,9 +104,10 @@ def parallel_joints(subject: Subject, found: Found) -> None:
 
     Reports the second joint between one pair of bodies.
 
-    OpenSim adds a hidden body and welds it with a constraint: more coordinates, and a joint that is much stiffer than
-    either. If one of the two is ground and the second joint is a weld, free, or the other way round, it refuses the
-    model.
+    OpenSim splits the child, lets each joint carry one half, and welds the halves with a constraint: more coordinates
+    than move, and inertias that the file does not say. Of a WeldJoint it makes a constraint, of a FreeJoint nothing,
+    but counts the child's mass twice. It refuses the model if the second joint is a CustomJoint, if its child is
+    ground, or if it is a WeldJoint or a FreeJoint to ground.
 
     ```xml
     - <PinJoint name="hip_again">
@@ -124,19 +121,19 @@ def parallel_joints(subject: Subject, found: Found) -> None:
       </PinJoint>
     ```
     """
-    first: dict[frozenset[int], Joint] = {}
     bones = skeleton(subject)
-    for link, parent, child in bones.pairs():
-        pair = frozenset((id(parent), id(child)))
-        if pair in first:
+    first: dict[frozenset[int], Joint] = {}
+    loops = growth(subject).loops
+    for link in bones.links:
+        if link not in loops:
+            first.setdefault(_ends(link), link.joint)
+    for link in loops:
+        if (before := first.setdefault(_ends(link), link.joint)) is not link.joint:
             found(
-                f"{called(link.joint)} connects the same two bodies as {called(first[pair])}: OpenSim "
-                + ("refuses the model, or " if id(bones.ground) in pair else "")
-                + "welds a hidden body between them",
+                f"{called(link.joint)} connects the same two bodies as {called(before)}; {_fate_of_loop(bones, link)}",
                 link.joint,
                 attribute="name",
             )
-        first.setdefault(pair, link.joint)
 
 
 @rule("OSIM407", "massless-leaf", severity=ERROR)
@@ -156,13 +153,38 @@ def massless_leaf(subject: Subject, found: Found) -> None:
     bones = skeleton(subject)
     if not bones.complete or has_unknown_joints(subject):
         return
-    for body, members in _massless_leaves(bones):
+    for body, members, joint in _massless_leaves(bones):
         welded = f" with the bodies welded to it ({listed(item.name for item in members)})" if members else ""
+        fate = "computes NaN" if isinstance(joint, CustomJoint) else "refuses the model"
         found(
-            f"{called(body)}{welded} is massless and the end of its chain: OpenSim refuses the model or computes NaN",
+            f"{called(body)}{welded} is massless and the end of its chain: OpenSim {fate}",
             body,
             tag="mass",
         )
+
+
+def _ends(link: Link) -> frozenset[int]:
+    return frozenset((id(link.parent_base), id(link.child_base)))
+
+
+def _carries(link: Link, other: Link) -> bool:
+    return link is not other and link.child_base is other.child_base
+
+
+def _fate_of_loop(bones: Skeleton, link: Link) -> str:
+    """What OpenSim makes of a joint between bodies that other joints connect already."""
+    kind = type(link.joint)
+    to_ground = link.parent_base is bones.ground and issubclass(kind, WeldJoint | FreeJoint)
+    if to_ground or link.child_base is bones.ground or issubclass(kind, CustomJoint):
+        return "OpenSim refuses the model"
+    if issubclass(kind, WeldJoint):
+        return "OpenSim makes a constraint of it, and counts the mass of the child twice"
+    if issubclass(kind, FreeJoint):
+        return "OpenSim counts the mass of the child twice, and the second moves apart from all that is connected"
+    return (
+        "OpenSim splits the child, gives the halves another inertia, and welds them with a constraint; or refuses the "
+        "model where they do not meet in the default pose"
+    )
 
 
 class _Groups:
@@ -182,8 +204,8 @@ class _Groups:
             self._up[self.of(one)] = self.of(other)
 
 
-def _massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body]]]:
-    """Each rigid group of bodies that has no mass and hangs on one moving joint: its first body and the others."""
+def _massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body], Joint]]:
+    """Each rigid group of bodies that has no mass and hangs on one moving joint: its bodies, and the joint."""
     groups = _Groups()
     for link in bones.links:
         if isinstance(link.joint, WeldJoint):
@@ -202,4 +224,4 @@ def _massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body]]]:
             and key in {groups.of(base) for base in (link.parent_base, link.child_base) if base is not None}
         ]
         if len(moving) == 1:
-            yield bodies[0], bodies[1:]
+            yield bodies[0], bodies[1:], moving[0].joint
