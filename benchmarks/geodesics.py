@@ -35,6 +35,13 @@ CASES = {
     "torus": (["Torus all"], "13"),
     "cylinder and ellipsoid": (["Cylinder all", "Ellipsoid all"], "35"),
     "two cylinders": (["Cylinder all", "Cylinder all"], "17"),
+    "two ellipsoids": (["Ellipsoid all", "Ellipsoid all"], ""),
+    "ellipsoid and sphere": (["Ellipsoid all", "Sphere all"], ""),
+    "sphere and ellipsoid": (["Sphere all", "Ellipsoid all"], ""),
+    "sphere and cylinder": (["Sphere all", "Cylinder all"], ""),
+    "cylinder and sphere": (["Cylinder all", "Sphere all"], ""),
+    "ellipsoid and cylinder": (["Ellipsoid all", "Cylinder all"], ""),
+    "ellipsoid with a side": (["Ellipsoid y"], ""),
 }
 POSES, SWEEPS, STEPS = 1500, 150, 400
 H, EXACT = (2e-4, 2e-5, 4e-6, 1e-6), 1e-9

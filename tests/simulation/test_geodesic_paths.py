@@ -125,7 +125,10 @@ ALL = {"Cylinder": [0.03, 9.0], "Sphere": [0.04], "Ellipsoid": [0.03, 0.05, 0.04
 
 @pytest.mark.parametrize(
     "kinds",
-    [("Cylinder", "Cylinder"), ("Cylinder", "Ellipsoid"), ("Ellipsoid", "Ellipsoid"), ("Sphere", "Sphere")],
+    [
+        *(("Cylinder", "Cylinder"), ("Cylinder", "Ellipsoid"), ("Ellipsoid", "Ellipsoid"), ("Sphere", "Sphere")),
+        *(("Sphere", "Ellipsoid"), ("Sphere", "Cylinder"), ("Cylinder", "Sphere")),
+    ],
     ids=" and ".join,
 )
 def test_lengths_around_two_surfaces_do_not_jump(kinds):

@@ -3,9 +3,9 @@
 Between two neighbouring points each PathWrap whose range holds both bends the path where that touches, whatever it does
 between other points. So its surface stands in the path once for each point that a bent piece may begin at. Of the
 surfaces that a piece goes through, that which turns it most is put into it first; then all geodesics of the piece are
-corrected at once, until it is as short as a string; then it may meet, or leave, another surface. Where surfaces may be
-passed on either side, both are tried, and the shortest of all ways is taken: so lengths do not jump as another one
-becomes the shortest. What is found depends on the pose alone.
+corrected at once, until it is as short as a string; then it may meet, or leave, another surface. Where open surfaces
+may be passed in several directions all are tried, and the shortest of all ways is taken: so lengths do not jump as
+another one becomes the shortest. What is found depends on the pose alone.
 
 A surface inside which a point of the piece lies bends it nowhere, as in OpenSim. A piece for which no geodesics are
 found goes straight on; none such is known but where a point lies on a surface.
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.forces.vectors import Vector, cross, minus, norm, put, times, vector
+from osimlite.forces.vectors import Vector, cross, minus, norm, put, times, unit, vector
 from osimlite.simulation.kernels.cable_paths import GEODESIC, GROUND_END, GROUND_START, IN_GROUND, OBSTACLE_WORK
 from osimlite.simulation.kernels.cable_surfaces import (
     ARC,
@@ -44,8 +44,8 @@ from osimlite.simulation.kernels.geodesic_starts import (
     SIDE,
     SURFACE,
     depth,
-    has_two_ways,
     start,
+    ways_past,
 )
 from osimlite.simulation.kernels.layout import NUMBERS, OK, RECORD
 from osimlite.simulation.kernels.path_wraps import in_surface
@@ -88,8 +88,8 @@ WHOLE = 10.0
 """More than any such angle."""
 INSIDE = 1e-14
 """A point counts as inside a surface if it is so far below it, in units of its function."""
-WAYS, NEARLY = 8, 0.97
-"""So many ways around surfaces that may be passed either way are tried; those that are this much longer are left."""
+WAYS, NEARLY = 16, 0.97
+"""So many ways past open surfaces are tried at most; those that are this much longer are left."""
 MEANT, STRING, ALONE = 0, 1, 2
 """How a piece is bent, if not otherwise: as is meant; around ellipsoids as a string; around one surface alone."""
 TURNS = 16
@@ -222,12 +222,15 @@ def settle(
                 is_open = numbers[SIDE] == 0.0 and numbers[SURFACE + KIND] != TORUS and step > 1
                 if is_open and norm(vector(pose, ABOUT)) == 0.0:
                     a, b = seen(pose, work, one), seen(pose, work, two)
-                    if near > 1 or has_two_ways(at(numbers, SURFACE), a, b):
-                        step //= 2
-                        is_other = way // step % 2 == 1
-                        put(pose, ABOUT, times(-1.0 if is_other else 1.0, axis))
-                        # On the other side it waits for what else is met: alone it might slide back.
-                        waits = is_other and stage < ALONE
+                    ways = min(ways_past(at(numbers, SURFACE), a, b, near == 1), step)
+                    if ways > 1:
+                        step //= ways
+                        which = way // step % ways
+                        if which > 1:
+                            axis = cross(axis, unit(minus(b, a)))
+                        put(pose, ABOUT, times(-1.0 if which % 2 == 1 else 1.0, axis))
+                        # Elsewhere than first it waits for what else is met: alone it might slide back.
+                        waits = which > 0 and stage < ALONE
                 insert(numbers, pose, chain, count, place, number)
                 if not lay(numbers, pose, chain, count + 1, place, stage, room):
                     take_out(chain, count + 1, place)
@@ -300,9 +303,11 @@ def meet_most(
                 a, b = in_surface(pose, end_before(chain, k + 1)), in_surface(pose, start_after(chain, k, count))
                 if value(surface, a) <= inside and value(surface, b) <= inside:
                     turn, point, way, _ = start(numbers, a, b, pose[HOW], (0.0, 0.0, 0.0), room)
-                    # Which line meets it is told by the shorter way.
+                    # Which line meets it is told by the shorter way; it is met, also if no other way is found.
                     if turn > TOUCH and norm(about) > 0.0:
-                        turn, point, way, _ = start(numbers, a, b, pose[HOW], about, room)
+                        other, there, onwards, _ = start(numbers, a, b, pose[HOW], about, room)
+                        if other > TOUCH:
+                            turn, point, way = other, there, onwards
                     if turn > TOUCH and turn + before > most:
                         found, place, most, axis = number, k + 1, turn + before, cross(point, way)
     return found, place, axis

@@ -40,6 +40,7 @@ from osimlite.simulation.kernels.cable_surfaces import (
     ELLIPSOID,
     KIND,
     RADIUS,
+    SPHERE,
     SQUARE,
     TORUS,
     TUBE,
@@ -66,9 +67,13 @@ LEAST = 1e-100
 """What is not divided by."""
 SAMPLES, STEPS = 16, 6
 """The place of a line that is nearest to a ring is found among so many, and made exact in so many steps."""
+NEAR_MIDDLE = 0.3
+"""Squared, by radii: as `depth` tells it."""
 WAYS, WORTHWHILE = 16, 1.5
 """So many directions across a line are tried on an ellipsoid; the next best is worth trying if the line is at most so
 much deeper there."""
+ASIDE = 0.5
+"""A line is bent in the direction that its axis tells, if the cosine with the one where it is least deep is less."""
 BENT, BEADS, PULLS = 0.7, 16, 8
 """If the cosine between both ends of a path is less than this, a string is pulled tight over an ellipsoid: of so many
 pieces, so often."""
@@ -95,15 +100,21 @@ def start(p: Floats, first: Vector, second: Vector, how: float, about: Vector, r
     return around_ellipsoid(surface, first, second, axis, side, how, about, room)
 
 
-def has_two_ways(p: Floats, first: Vector, second: Vector) -> bool:
-    """Whether either way around a surface may be the shorter one for a line that goes through it."""
+def ways_past(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
+    """In how many directions a line that goes through an open surface is to be bent, to find the shortest way.
+
+    Around a surface alone there is another one only on an ellipsoid. Among others each is passed on either side, and a
+    sphere, on which any direction may be the best, also across these if the line goes through near its middle.
+    """
+    if not is_alone:
+        return 4 if p[KIND] == SPHERE and depth(p, first, second) < NEAR_MIDDLE else 2
     if p[KIND] != ELLIPSOID:
-        return False
+        return 1
     way, weights = minus(second, first), vector(p, WEIGHTS)
     part = -dot(elementwise(weights, first), way) / max(dot(elementwise(weights, way), way), LEAST)
     x, y, z = weights
     out = way_out((sqrt(1.0 / x), sqrt(1.0 / y), sqrt(1.0 / z)), along(first, part, way), way, WORTHWHILE)
-    return dot(out, out) > 0.0
+    return 2 if dot(out, out) > 0.0 else 1
 
 
 def depth(p: Floats, first: Vector, second: Vector) -> float:
@@ -210,8 +221,12 @@ def around_ellipsoid(
         out = way_out(
             radii, times(0.0 if norm(about) > 0.0 else 1.0, elementwise(radii, middle)), elementwise(radii, way), 0.0
         )
-    if dot(about, cross(out, elementwise(radii, way))) < 0.0:
-        out = times(-1.0, out)
+    if norm(about) > 0.0:
+        out = times(-1.0 if dot(about, cross(out, elementwise(radii, way))) < 0.0 else 1.0, out)
+        # Across the side where it is least deep: another surface may make that the shortest.
+        other = cross(elementwise(radii, way), about)
+        if p[KIND] == SPHERE and dot(unit(other), unit(out)) < ASIDE:
+            out = other
     if side != 0.0 and not on_side(out, axis, side):
         # Towards where a mirror would have it, which itself is near no geodesic.
         mirrored = replaced(out, axis, -component(out, axis))
