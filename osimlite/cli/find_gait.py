@@ -11,7 +11,7 @@ from osimlite.cli._command import Option, command
 from osimlite.cli._console import Facts
 
 if TYPE_CHECKING:
-    from osimlite.sweep.gaits import Gait
+    from osimlite.gait.gaits import Gait
 
 
 @command
@@ -55,7 +55,7 @@ def find_gait(
     --vary LHip_rz=-30deg:60deg --vary RHip_rz/speed=-4:4 --vary LHip_rz/speed=-4:4
     """
     from osimlite.cli._progress import progress_bars
-    from osimlite.sweep.gaits import find_gait as search
+    from osimlite.gait.gaits import find_gait as search
 
     plan = sweeping.make_plan(source, vary, parameter, None, None, skip_unsupported=skip_unsupported)
     with progress_bars() as stage:
@@ -69,7 +69,7 @@ def find_gait(
 
 
 def _told(gait: Gait) -> Facts:
-    from osimlite.sweep.cycles import STARTS, STEPS
+    from osimlite.gait.cycle_search import STARTS, STEPS
     from osimlite.text import counted, listed
 
     cycle, walk = gait.found.cycle, gait.walk

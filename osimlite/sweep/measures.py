@@ -14,31 +14,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from importlib import import_module
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from osimlite._load import module_named, module_of_file
 from osimlite.errors import ModelError, SettingError
 from osimlite.simulation.runs import Runs, Watch
+from osimlite.sweep import registry
 from osimlite.sweep.expressions import Expression, Quantity, quantities
 from osimlite.sweep.variables import Floats
 from osimlite.text import did_you_mean, or_known
-
-BUILT_IN = {
-    "distance": "osimlite.sweep.measures:distance",
-    "energy": "osimlite.sweep.measures:energy",
-    "largest_force": "osimlite.sweep.measures:largest_force",
-    "steps": "osimlite.sweep.walking:steps",
-    "scuffs": "osimlite.sweep.walking:scuffs",
-    "progress": "osimlite.sweep.walking:progress",
-    "time_to_fall": "osimlite.sweep.walking:time_to_fall",
-}
-"""Measures by name, and the function of an engine that makes each."""
-
-LARGER_IS_BETTER = ("distance", "steps", "progress", "time_to_fall")
 
 
 @dataclass(frozen=True)
@@ -103,13 +90,6 @@ class Measure:
     watches: tuple[Watch, ...] = ()
     room: Callable[[float], int] = lambda to: 0
     event_states: bool = False
-
-
-class MeasureMaker(Protocol):
-    """Makes a measure for the models of an engine."""
-
-    def __call__(self, engine: Any, feet: Sequence[str] | None) -> Measure:
-        """Make it; raises OsimliteError if the model has nothing of the kind."""
 
 
 class State(Mapping[str, float]):
@@ -182,10 +162,8 @@ def measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> Measur
     name = measure_name(spec)
     if callable(spec):
         return Measure(name, partial(_each, spec), room=_room)
-    if name in BUILT_IN:
-        module, _, function = BUILT_IN[name].partition(":")
-        maker: MeasureMaker = getattr(import_module(module), function)
-        return maker(engine, feet)
+    if (known := registry.measure_named(name)) is not None:
+        return known.make(engine, feet)
     if ":" in name:
         return Measure(name, partial(_each, _function(name)), room=_room)
     if is_expression(name):
@@ -196,7 +174,7 @@ def measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> Measur
         except ModelError as error:
             raise SettingError(f"there is no measure '{name}': {error.message}") from None
         return Measure(name, partial(_ends, place, locked))
-    raise SettingError(f"there is no measure '{name}'{or_known(name, BUILT_IN, 'module:function')}")
+    raise SettingError(f"there is no measure '{name}'{or_known(name, registry.measure_names(), 'module:function')}")
 
 
 def is_expression(spec: Any) -> bool:
@@ -219,6 +197,7 @@ def measure_name(spec: Any) -> str:
     return str(spec)
 
 
+@registry.measure(is_maximized=True)
 def distance(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """How far the first free coordinate that slides has come, m."""
     infos = engine.mechanism.coordinates
@@ -228,11 +207,13 @@ def distance(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     return Measure("distance", lambda batch: batch.runs.states[:, place] - batch.starts[:, place])
 
 
+@registry.measure()
 def largest_force(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """The largest force of any contact at the end of a step, N."""
     return Measure("largest_force", lambda batch: batch.runs.peaks[:, :, 0].max(axis=1, initial=0.0))
 
 
+@registry.measure()
 def energy(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """Mechanical energy at the end less that at the start, J; contact and damping take it away."""
 

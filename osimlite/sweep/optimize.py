@@ -17,7 +17,8 @@ from osimlite._require import require
 from osimlite.document.printer import write
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.files import folder_to_fill, write_atomically
-from osimlite.sweep.measures import LARGER_IS_BETTER, measure_name
+from osimlite.sweep import registry
+from osimlite.sweep.measures import measure_name
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool
 from osimlite.sweep.results import KEY, Partial, ResultTable, damage_told, partial_of, refuse_overwrite, schema, spare
@@ -41,7 +42,7 @@ class Objective:
 
     Attributes:
         measure: name of a measure, ``module:function``, or a function.
-        is_maximized: whether more is better; by default for the measures in `LARGER_IS_BETTER`.
+        is_maximized: whether more is better; by default for the measures that are registered so.
     """
 
     measure: Any
@@ -50,7 +51,8 @@ class Objective:
     @property
     def sign(self) -> float:
         """What makes a cost of the measure."""
-        wanted = measure_name(self.measure) in LARGER_IS_BETTER if self.is_maximized is None else self.is_maximized
+        known = registry.measure_named(measure_name(self.measure))
+        wanted = bool(known and known.is_maximized) if self.is_maximized is None else self.is_maximized
         return -1.0 if wanted else 1.0
 
 

@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,13 +28,8 @@ from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
 from osimlite.sweep.controls import Control, VariedControls
 from osimlite.sweep.plan import Plan
+from osimlite.sweep.registry import start_named
 from osimlite.sweep.variables import Floats, Parameter, Property, Slope, Start
-
-if TYPE_CHECKING:
-    from osimlite.gait.foot_contacts import FootContacts
-
-PRESSED = 8e-4
-"""So deep (m) in the ground is the foot of a walker that is planted: it touches beyond doubt, and little presses it."""
 
 RENEWED = Force, Controller, Body, Model
 """What an engine need not be made anew for."""
@@ -91,7 +86,7 @@ class Variants:
         self.given = self._whole()
         if plan.is_planted:
             # A model without two feet is told of before any run.
-            self._footing(self.given.engine)
+            start_named("planted")(self.given.engine, plan.feet)
         self._kept: dict[tuple[float, ...], Variant | OsimliteError] = {}
         self._renewal: Renewal | None = None
 
@@ -182,12 +177,9 @@ class Variants:
         """
         if not self._plan.is_planted:
             return starts
-        from osimlite.gait.starts import planted, stood
-
-        footing = self._footing(engine)
+        place = start_named("planted")(engine, self._plan.feet)
         numbers = None if self.is_fixed else np.stack([variant.numbers for variant in variants])
-        resting = planted(engine, footing, starts, numbers=numbers)
-        return self.started(engine, variants, stood(engine, footing, resting, PRESSED, -1, numbers=numbers))
+        return place(starts, numbers, lambda states: self.started(engine, variants, states))
 
     def present(self) -> list[float | None]:
         """The values of the variables in the model as it is given; None where nothing tells it."""
@@ -238,14 +230,6 @@ class Variants:
             self.model.gravity = (g * math.sin(angle), -g * math.cos(angle), self.model.gravity[2])
 
     # ------------------------------------------------------------------------------------------------ helpers
-    def _footing(self, engine: Any) -> FootContacts:
-        """The feet that a walker is planted on."""
-        from osimlite.gait.foot_contacts import find_footing
-
-        if engine.name != "compiled":
-            raise SettingError("a walker is planted with --engine compiled only")
-        return find_footing(engine, self._plan.feet)
-
     def _adopt(self, model: Model) -> None:
         self.model = model
         self._gravity = math.hypot(*model.gravity[:2])

@@ -8,6 +8,7 @@ import pytest
 import osimlite
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.gait.foot_contacts import find_footing
+from osimlite.gait.measures import PRESSED
 from osimlite.gait.starts import planted
 from osimlite.gait.steps import along_slope, walk_many
 from osimlite.models.dynamic_walker import dynamic_walker
@@ -16,7 +17,6 @@ from osimlite.sweep.measures import measure
 from osimlite.sweep.optimize import Objective, optimize
 from osimlite.sweep.plan import plan
 from osimlite.sweep.runner import Runner
-from osimlite.sweep.variants import PRESSED
 
 pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
 VARY = {"RHip_rz": (-0.5, 0.5), "LHip_rz/speed": (-4.0, 4.0), "LKnee_rz": (-1.0, 0.0)}

@@ -1,4 +1,4 @@
-"""Measures of walking: steps, scuffs and the time until the fall, which ends the run."""
+"""What sweeps can ask of walkers: steps, scuffs, the time until the fall, which ends the run; a start on their feet."""
 
 from __future__ import annotations
 
@@ -9,26 +9,36 @@ import numpy as np
 
 from osimlite.errors import SettingError
 from osimlite.gait.foot_contacts import FootContacts, find_footing
+from osimlite.gait.starts import planted as at_rest
+from osimlite.gait.starts import stood
 from osimlite.gait.steps import SHORTEST, Walk, along_slope, falls, room_for, walks_of
+from osimlite.sweep import registry
 from osimlite.sweep.measures import Batch, Measure
 from osimlite.sweep.variables import Floats
 
+PRESSED = 8e-4
+"""So deep (m) in the ground is the foot of a walker that is planted: it touches beyond doubt, and little presses it."""
 
+
+@registry.measure(is_maximized=True)
 def steps(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """How many steps were made."""
     return _measure("steps", engine, feet, lambda walk: len(walk.steps))
 
 
+@registry.measure()
 def scuffs(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """How many touch-downs were no steps."""
     return _measure("scuffs", engine, feet, lambda walk: len(walk.scuffs))
 
 
+@registry.measure(is_maximized=True)
 def time_to_fall(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """When the walk ended, s; the end of the run for those that did not fall."""
     return _measure("time_to_fall", engine, feet, lambda walk: walk.end)
 
 
+@registry.measure(is_maximized=True)
 def progress(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """How many steps were made before the first scuff, and how near the next one was: what a search can climb.
 
@@ -47,6 +57,20 @@ def progress(engine: Any, feet: Sequence[str] | None = None) -> Measure:
         return np.array([_progress(walk, ends) for walk, ends in found])
 
     return _made("progress", footing, numbers)
+
+
+@registry.start
+def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
+    """On the ground with the deeper foot, at rest there."""
+    if engine.name != "compiled":
+        raise SettingError("a walker is planted with --engine compiled only")
+    footing = find_footing(engine, feet)
+
+    def place(states: Floats, numbers: Floats | None, started: Callable[[Floats], Floats]) -> Floats:
+        resting = at_rest(engine, footing, states, numbers=numbers)
+        return started(stood(engine, footing, resting, PRESSED, -1, numbers=numbers))
+
+    return place
 
 
 def _progress(walk: Walk, places: Sequence[float]) -> float:

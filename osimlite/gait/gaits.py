@@ -14,12 +14,12 @@ import numpy as np
 from osimlite.document.printer import write
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.files import folder_to_fill, write_atomically
+from osimlite.gait.cycle_search import Candidate, CycleSearch, Found, Progress, along
+from osimlite.gait.stability import Improvement, cost
 from osimlite.gait.stepmap import TIGHT, refuse_constraints
 from osimlite.gait.steps import Walk, walk_many
-from osimlite.sweep.cycles import Candidate, CycleSearch, Found, Progress, along
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.results import refuse_others, refuse_overwrite
-from osimlite.sweep.stability import Improvement, cost
 from osimlite.sweep.variables import Floats
 
 BEST, CYCLES, SUMMARY = "best.osim", "cycles.csv", "summary.json"

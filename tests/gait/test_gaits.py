@@ -21,12 +21,14 @@ from osimlite.simulation import Simulation
 from osimlite.sweep.plan import plan
 
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+pytest.importorskip("pyarrow", reason="needs pyarrow (extra 'sweep')")
+pytest.importorskip("scipy", reason="needs scipy (extra 'sweep')")
 
 from osimlite.gait.cycle import find_cycle
+from osimlite.gait.cycle_search import CycleSearch, Found
+from osimlite.gait.gaits import find_gait
+from osimlite.gait.stability import Improvement
 from osimlite.gait.stepmap import StepMap
-from osimlite.sweep.cycles import CycleSearch, Found
-from osimlite.sweep.gaits import find_gait
-from osimlite.sweep.stability import Improvement
 
 INERTIA, AHEAD = "/bodyset/*Shank/inertia/2", "/contactgeometryset/*FootContact/location/0"
 JOINTS = [name for name in STEADY_START if not name.startswith("Pelvis")]

@@ -5,7 +5,7 @@
 2. From the best of them, the start and the numbers are moved together until the step ends where it began (least squares
    by a trust region, then Newton's method), which is a cycle.
 3. The numbers of the best cycle are led on, from cycle to cycle, to where its largest multiplier is small, and then to
-   where most of the walkers that start near it walk (`osimlite.sweep.stability`).
+   where most of the walkers that start near it walk (`osimlite.gait.stability`).
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from operator import attrgetter
 import numpy as np
 
 from osimlite.errors import OsimliteError
-from osimlite.sweep.cycles import CycleSearch, Found, Progress
+from osimlite.gait.cycle_search import CycleSearch, Found, Progress
 from osimlite.sweep.search import BudgetExhausted, Search, cma, nelder_mead
 from osimlite.sweep.variables import Floats
 
