@@ -8,7 +8,6 @@ import textwrap
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -16,6 +15,7 @@ from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command
 from osimlite.cli._console import say, show
 from osimlite.cli._progress import motion_bar
+from osimlite.records import dataclass, replace
 from osimlite.text import listed
 
 if TYPE_CHECKING:

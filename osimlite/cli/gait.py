@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +10,7 @@ from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command
 from osimlite.cli._console import Facts
 from osimlite.cli._progress import progress_bar
+from osimlite.records import dataclass, field
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

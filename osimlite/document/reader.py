@@ -8,7 +8,6 @@ import re
 from codecs import BOM_UTF8
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -23,6 +22,7 @@ from osimlite.document.source import Source
 from osimlite.document.syntax import expect_plain_doctype, place_of, plain_words
 from osimlite.errors import DocumentError, MissingFileError, NotWellFormedError, SpecialFileError, VersionError
 from osimlite.files import TABLES, expect_size
+from osimlite.records import dataclass, field
 from osimlite.schema.base import Object
 from osimlite.schema.layout import Include, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 
 from lxml import etree
 
@@ -11,6 +10,7 @@ from osimlite.document.names import as_written
 from osimlite.document.reader import ROOT, Document, document_of, parse, read_document, version_of
 from osimlite.document.source import Source
 from osimlite.errors import DocumentError, NotWellFormedError, VersionError
+from osimlite.records import dataclass, field
 from osimlite.schema.base import Object
 from osimlite.schema.model import CURRENT_VERSION, Model
 

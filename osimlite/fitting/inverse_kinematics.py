@@ -7,7 +7,6 @@ the markers that were seen, and half of the weighted squared deviations of coord
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from osimlite.fitting.pose_layout import Goal, Marker
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism, StationPlacement
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass, field
 from osimlite.schema.markers import Marker as ModelMarker
 from osimlite.schema.model import Model
 from osimlite.simulation.tabular import Tabular

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from osimlite._require import require
 from osimlite.errors import DocumentError, OsimliteError, SettingError
 from osimlite.files import read_file
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 from osimlite.simulation.files.storage import read_sto
 from osimlite.tables import METRES, MarkerHeader
 from osimlite.text import did_you_mean, listed

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ from osimlite.multibody.constraints import Lock, Prescribed
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
+from osimlite.records import replace
 from osimlite.simulation.constrained import free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.items import Places

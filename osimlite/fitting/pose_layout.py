@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from osimlite.multibody.constraints import Constraint, Coupler
 from osimlite.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
+from osimlite.records import dataclass
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels import pose_record as fit

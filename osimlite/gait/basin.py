@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +12,7 @@ from osimlite.gait.cycle import Cycle
 from osimlite.gait.starts import stood
 from osimlite.gait.stepmap import StepMap
 from osimlite.gait.steps import Walk, along_slope, walk_many
+from osimlite.records import dataclass
 from osimlite.simulation.many import BatchEngine
 from osimlite.simulation.runs import Floats, Ints
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from osimlite.errors import OsimliteError
 from osimlite.gait.stepmap import StepMap
 from osimlite.gait.steps import along_slope
+from osimlite.records import dataclass
 from osimlite.simulation.runs import Floats
 
 CONVERGED = 1e-9

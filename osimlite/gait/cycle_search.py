@@ -11,7 +11,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -25,6 +24,7 @@ from osimlite.gait.foot_contacts import FootContacts, find_footing
 from osimlite.gait.starts import planted, upright
 from osimlite.gait.stepmap import TIGHT, StepMap
 from osimlite.gait.steps import Walk, walk_many
+from osimlite.records import dataclass
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
 from osimlite.simulation.many import BatchEngine, run_many

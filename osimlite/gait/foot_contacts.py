@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from osimlite.errors import OsimliteError
 from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.records import dataclass
 from osimlite.simulation.elements.contact import HuntCrossley
 from osimlite.simulation.many import BatchEngine
 from osimlite.text import counted, listed, or_known

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from osimlite.gait.cycle_search import Candidate, CycleSearch, Found, Progress, 
 from osimlite.gait.stability import Improvement, cost
 from osimlite.gait.stepmap import TIGHT, refuse_constraints
 from osimlite.gait.steps import Walk, walk_many
+from osimlite.records import dataclass
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.results import refuse_others, refuse_overwrite
 from osimlite.sweep.variables import Floats

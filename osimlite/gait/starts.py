@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from osimlite.gait.foot_contacts import FootContacts
 from osimlite.gait.steps import along_slope
+from osimlite.records import dataclass
 from osimlite.simulation.many import BatchEngine
 from osimlite.simulation.runs import Floats, Ints
 

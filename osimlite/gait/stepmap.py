@@ -8,7 +8,6 @@ map goes from step to step, and otherwise from stride to stride.
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +17,7 @@ from osimlite.gait.foot_contacts import FootContacts, find_footing
 from osimlite.gait.steps import Step, along_slope, falls, room_for, walks_of
 from osimlite.gait.symmetry import leg_exchange, neutral_directions
 from osimlite.multibody.mechanism import Mechanism
+from osimlite.records import dataclass
 from osimlite.simulation.many import BatchEngine, Watch, run_many
 from osimlite.simulation.run import kept_constraints
 from osimlite.simulation.runs import Floats, Ints

@@ -7,13 +7,13 @@ touch-down is a scuff. Anything but a foot on the ground ends the walk.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from osimlite.gait.foot_contacts import FootContacts, find_footing
+from osimlite.records import dataclass, field
 from osimlite.simulation.integrators import DEFAULT_ACCURACY
 from osimlite.simulation.many import ENDINGS, NO_LIMIT, BatchEngine, Runs, Watch, run_many
 from osimlite.simulation.runs import Floats

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from dataclasses import replace
 from pathlib import Path
 
 from osimlite.errors import OsimliteError
 from osimlite.files import read_file, write_atomically
 from osimlite.lint.diagnostic import Finding, Report
+from osimlite.records import replace
 
 _FORMAT = 1
 

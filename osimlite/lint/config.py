@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from osimlite.errors import OsimliteError
 from osimlite.lint.diagnostic import Severity
+from osimlite.records import dataclass, field
 
 if TYPE_CHECKING:
     from osimlite.lint.engine import Rule

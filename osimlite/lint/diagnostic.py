@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
 from osimlite._lazy import shown_in_notebooks
+from osimlite.records import dataclass, field
 from osimlite.text import visible
 
 

@@ -6,7 +6,6 @@ A rule is a function of the subject and of `found`, which it calls once per find
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from inspect import cleandoc
@@ -27,6 +26,7 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.suffixes import is_document, is_table
 from osimlite.lint.suppressions import Suppression
 from osimlite.lint.table import Table
+from osimlite.records import dataclass, replace
 from osimlite.schema.base import Object
 from osimlite.schema.model import Model
 from osimlite.schema.registry import let_count

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from time import time_ns
@@ -17,6 +16,7 @@ from osimlite.lint.cache import Cache, folder_for, key_of, text_of
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report, merged
 from osimlite.lint.settings import Settings, settings_for
+from osimlite.records import replace
 
 WORTH_SHARING = 4_000_000
 """Bytes of models from which on further processes are started; checking takes about a second for 15 MB."""

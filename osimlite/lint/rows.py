@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from array import array
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from osimlite.records import dataclass, field
 from osimlite.text import counted
 
 _TOLD = 50

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import groupby, islice, pairwise
 from math import inf, nan, nextafter
@@ -16,6 +15,7 @@ from operator import lt
 
 from osimlite.lint.rows import Fault, Rows
 from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, shapes
+from osimlite.records import dataclass, field
 
 BLOCK = 16_000
 """Bytes that are looked at together: few enough for the fastest memory of a processor."""

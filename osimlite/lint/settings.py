@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from functools import cache
 from pathlib import Path
@@ -14,6 +13,7 @@ from osimlite.files import named_mesh_folders
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Severity
 from osimlite.project import largest_file_in, settings_table
+from osimlite.records import dataclass, field
 from osimlite.text import did_you_mean, listed
 
 _KNOWN = (

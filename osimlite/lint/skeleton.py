@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from itertools import chain
 from typing import NamedTuple, cast
 
 from osimlite.lint.subject import Subject, once
 from osimlite.multibody.topology import new_base, spanning_tree
+from osimlite.records import dataclass, field
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.frames import Body, Ground, StationDefinedFrame

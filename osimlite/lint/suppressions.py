@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 from osimlite.document.source import Position, Source
 from osimlite.lint.diagnostic import Finding
+from osimlite.records import dataclass, field
 
 _COMMENT = re.compile(r"<!--\s*osimlite:\s*ignore\b([^>]*?)-->")
 _LINE = re.compile(r"^\W*osimlite:\s*ignore\b(.*)$")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import pi
 
 import numpy as np
@@ -14,6 +13,7 @@ from osimlite.multibody.kinematics import kinematics
 from osimlite.multibody.linear import stacked
 from osimlite.multibody.parts import CoordinateInfo
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 from osimlite.simulation.paths import Paths
 
 VALUES, TIED_VALUES, TIED_POSES = 9, 5, 40

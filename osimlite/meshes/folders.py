@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from osimlite.errors import OsimliteError
 from osimlite.files import NAMED_SO, named_mesh_folders
+from osimlite.records import dataclass
 
 
 class OutsideError(OsimliteError):

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from osimlite.records import dataclass
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

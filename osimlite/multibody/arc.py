@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from osimlite.multibody.functions import Function
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 
 _TERMS = np.arange(16)
 SINE_TERMS = (-1.0) ** _TERMS / np.array([math.factorial(2 * n + 1) for n in _TERMS.tolist()], dtype=float)

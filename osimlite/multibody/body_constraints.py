@@ -6,7 +6,6 @@ are given in the frames of the bodies; -1 stands for ground.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -15,6 +14,7 @@ from osimlite.multibody.constraints import Bond, Bonded
 from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.parts import FramePlacement, StationPlacement
 from osimlite.multibody.spatial import Array, cross, skew
+from osimlite.records import dataclass
 
 
 class MovingVector(NamedTuple):

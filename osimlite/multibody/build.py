@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from osimlite.errors import ModelError, UnsupportedError
@@ -27,6 +25,7 @@ from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.schema_joints import joint_motions, unknown_joint
 from osimlite.multibody.spatial import Array
 from osimlite.multibody.topology import new_base, spanning_tree
+from osimlite.records import dataclass, replace
 from osimlite.schema import constraints as schema
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.coordinates import Coordinate

@@ -6,7 +6,6 @@ Here are those that speak of coordinates; those between bodies are in :mod:`osim
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from osimlite.multibody.functions import Function
 from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 
 
 class Constraint(Protocol):

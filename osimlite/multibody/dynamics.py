@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from math import sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,6 +18,7 @@ from osimlite.errors import SimulationError
 from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.linear import ROUNDING, shortest, solutions, stacked
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 
 if TYPE_CHECKING:
     from osimlite.multibody.constraints import Constraint

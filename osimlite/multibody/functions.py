@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from osimlite.errors import ModelError
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 
 
 class Function(ABC):

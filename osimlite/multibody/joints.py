@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -33,6 +32,7 @@ from osimlite.multibody.motions import (
     translate,
 )
 from osimlite.multibody.spatial import Array, RelativeMotion, inverse, rotation_about, transform
+from osimlite.records import dataclass, field
 from osimlite.schema.joints import MotionType
 
 # Coordinates in OpenSim's order: planar rz, tx, ty; free rx, ry, rz, tx, ty, tz.

@@ -8,12 +8,12 @@ stack the angular part over the linear part of the body's origin.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from osimlite.multibody.spatial import Array, carried, cross, skew, transform, turned
+from osimlite.records import dataclass
 
 if TYPE_CHECKING:
     from osimlite.multibody.mechanism import Mechanism

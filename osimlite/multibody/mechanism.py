@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +31,7 @@ from osimlite.multibody.parts import (
     StationPlacement,
 )
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass, field, replace
 from osimlite.text import did_you_mean
 
 __all__ = [

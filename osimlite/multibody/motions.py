@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -26,6 +25,7 @@ from osimlite.multibody.spatial import (
     transform,
 )
 from osimlite.multibody.spatial import inverse as inverse_transform
+from osimlite.records import dataclass, field
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from osimlite.multibody.functions import Function
 from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass, field
 from osimlite.schema.joints import MotionType
 
 GROUND = -1

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from osimlite.multibody.parts import FramePlacement, StationPlacement
 from osimlite.multibody.schema_frames import Placements
 from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 from osimlite.schema import constraint_types as schema
 from osimlite.schema.base import Component
 from osimlite.schema.constraints import Constraint as SchemaConstraint

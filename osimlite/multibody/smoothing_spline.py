@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from numpy.typing import ArrayLike
 from osimlite._require import require
 from osimlite.multibody.functions import Univariate
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 

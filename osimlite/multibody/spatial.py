@@ -7,11 +7,12 @@ moving frame.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from osimlite.records import dataclass
 
 Array = NDArray[np.float64]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -13,6 +12,7 @@ from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.mechanism import Mechanism, Values
 from osimlite.multibody.motions import AxisMotion, Fixed
 from osimlite.multibody.spatial import Array
+from osimlite.records import replace
 from osimlite.robot.lines import as_line
 from osimlite.robot.robot import WORLD, Link, Robot, RobotJoint
 from osimlite.robot.shapes import Visual

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from osimlite.multibody import functions as f
 from osimlite.multibody.smoothing_spline import PiecewisePolynomial
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 from osimlite.robot.lines import as_line
 from osimlite.robot.mimics import couplers
 from osimlite.robot.robot import Robot, RobotJoint

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from osimlite.multibody.spatial import Array, skew
+from osimlite.records import replace
 from osimlite.robot.robot import Link, Robot
 
 

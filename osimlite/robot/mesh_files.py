@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from osimlite.errors import OsimliteError
@@ -11,6 +10,7 @@ from osimlite.meshes.folders import MeshFolders
 from osimlite.meshes.read import read_surface
 from osimlite.meshes.stl import binary_stl, is_binary
 from osimlite.meshes.surface import Surface
+from osimlite.records import dataclass, field
 from osimlite.robot.names import legal
 
 MESH_FOLDER = "meshes"

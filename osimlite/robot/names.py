@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
+from osimlite.records import replace
 from osimlite.robot.robot import WORLD, Robot
 from osimlite.text import unused
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
+from osimlite.records import replace
 from osimlite.robot.lines import as_line
 from osimlite.robot.robot import Robot, RobotJoint
 

@@ -15,7 +15,6 @@ How it corresponds to the mechanism it was built from:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -24,6 +23,7 @@ import numpy as np
 from osimlite.multibody.functions import IDENTITY, Function
 from osimlite.multibody.mechanism import Mechanism, Values
 from osimlite.multibody.spatial import Array, rotation_about, transform
+from osimlite.records import dataclass, field
 from osimlite.robot.shapes import Visual
 
 WORLD = "world"

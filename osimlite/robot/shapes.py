@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 
 
 class Box(NamedTuple):

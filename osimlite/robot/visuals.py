@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from math import copysign
 from typing import Protocol
 
@@ -11,6 +10,7 @@ import numpy as np
 from osimlite.meshes.unit_shapes import ball, tube
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array, rotation_about, transform
+from osimlite.records import dataclass, field
 from osimlite.robot.mesh_files import MeshFiles, MeshProblem
 from osimlite.robot.shapes import Ball, Box, MeshFile, Shape, Tube, Visual
 from osimlite.schema.frames import Frame

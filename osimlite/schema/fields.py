@@ -8,10 +8,11 @@ is the business of :mod:`osimlite.document.lexical`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
 from pydantic_core import core_schema
+
+from osimlite.records import dataclass
 
 if TYPE_CHECKING:
     from osimlite.schema.base import Object

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
+
+from osimlite.records import dataclass, field
 
 if TYPE_CHECKING:
     from osimlite.schema.base import Object

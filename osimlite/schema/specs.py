@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
+from osimlite.records import replace
 from osimlite.schema.fields import Held, Kind, Legacy, NamesOf, ObjectList, Reference, Tag, Value, class_in
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
         if kind is None:
             continue
         if any(isinstance(item, Legacy) for item in info.metadata):
-            kind = replace(kind, legacy=True)  # type: ignore[type-var]
+            kind = replace(kind, legacy=True)
         held = isinstance(kind, Held)
         accepts = class_in(info.annotation) if held else None
         tag = accepts.tag if accepts is not None and isinstance(kind, Held) and kind.form == "unnamed" else name

@@ -6,12 +6,12 @@ The rules by which a text resolves to a component are in :mod:`osimlite.schema.r
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from weakref import WeakSet
 
 from osimlite.errors import ModelError
+from osimlite.records import dataclass
 from osimlite.schema.base import Component, Object, put_model
 from osimlite.schema.fields import Held, ObjectList, Reference
 from osimlite.schema.resolution import EVERYWHERE, PATH_RULES, RULES, last_name

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from osimlite.multibody.functions import Constant, Function, Scaled, Univariate
 from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.smoothing_spline import smoothing_spline
 from osimlite.quantity import tell
+from osimlite.records import dataclass
 from osimlite.schema.base import Object
 from osimlite.simulation.elements.control_sets import ControlCurves
 from osimlite.simulation.elements.control_tables import read_controls

@@ -10,7 +10,6 @@ begin and end, levels that are passed) and the largest forces: `Runs`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Protocol
@@ -19,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from osimlite.errors import SettingError
 from osimlite.multibody.mechanism import Mechanism
+from osimlite.records import dataclass
 from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces

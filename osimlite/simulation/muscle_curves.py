@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +15,7 @@ from osimlite.errors import SettingError, SimulationError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.functions import Constant
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass, replace
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements import Forces, force_elements

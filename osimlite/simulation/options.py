@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from osimlite.errors import SettingError
+from osimlite.records import dataclass, replace
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.stepper import Progress

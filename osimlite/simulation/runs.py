@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from osimlite.records import dataclass, field
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

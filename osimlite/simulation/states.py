@@ -7,7 +7,6 @@ of the force elements.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
@@ -17,6 +16,7 @@ from numpy.typing import ArrayLike
 from osimlite.errors import OsimliteError
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
 

@@ -15,13 +15,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import count
 from typing import Any
 
 import numpy as np
 
 from osimlite.errors import SettingError
+from osimlite.records import dataclass
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.controllers import Controller

@@ -12,7 +12,6 @@ or an expression, as :mod:`osimlite.sweep.expressions` has them: ``start(Pelvis_
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ import numpy as np
 
 from osimlite._load import module_named, module_of_file
 from osimlite.errors import ModelError, SettingError
+from osimlite.records import dataclass, field, replace
 from osimlite.simulation.runs import Runs, Watch
 from osimlite.sweep import registry
 from osimlite.sweep.expressions import Expression, Quantity, quantities

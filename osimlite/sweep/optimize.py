@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from osimlite._require import require
 from osimlite.document.printer import write
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.files import folder_to_fill, write_atomically
+from osimlite.records import dataclass, replace
 from osimlite.sweep import registry
 from osimlite.sweep.measures import measure_name
 from osimlite.sweep.plan import Plan

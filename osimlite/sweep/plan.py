@@ -5,7 +5,6 @@ from __future__ import annotations
 import pickle
 import zlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
 from functools import partial
 from math import isfinite
 from types import MappingProxyType
@@ -17,6 +16,7 @@ from osimlite.errors import SettingError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import tell_doubt
+from osimlite.records import dataclass, replace
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.engines import engine_name

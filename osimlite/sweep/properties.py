@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import TypeVar
 
 from osimlite.errors import SettingError
 from osimlite.multibody.parts import CoordinateInfo
+from osimlite.records import dataclass, replace
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Value

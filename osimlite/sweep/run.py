@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from osimlite._lazy import shown_in_notebooks
 from osimlite.errors import OsimliteError, SettingError
+from osimlite.records import dataclass, field
 from osimlite.simulation.interrupts import defer_sigint
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.pools import Pool, pool

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from osimlite.errors import OsimliteError, SettingError
+from osimlite.records import dataclass, replace
 from osimlite.simulation.run import report_times
 from osimlite.simulation.runs import Runs, Watch
 from osimlite.sweep.measures import Batch, Measure, State, measure, measure_name

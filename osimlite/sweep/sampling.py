@@ -7,7 +7,6 @@ where it was interrupted.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from math import prod
 from typing import Any
 
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from osimlite._require import require
 from osimlite.errors import SettingError
+from osimlite.records import dataclass, field
 from osimlite.sweep.variables import Floats, Variable
 from osimlite.text import listed, or_known
 

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +29,7 @@ from numpy.typing import NDArray
 from osimlite.errors import SettingError
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import Quantity, quantity
+from osimlite.records import dataclass, replace
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.model import Model
 from osimlite.simulation.start import suspect_value

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import OsimliteError, SettingError, SimulationError
+from osimlite.records import dataclass
 from osimlite.schema.base import Component
 from osimlite.schema.controllers import Controller
 from osimlite.schema.forces import Force

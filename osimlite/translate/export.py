@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 from osimlite.errors import OsimliteError
 from osimlite.meshes.folders import MeshFolders
 from osimlite.multibody import build_mechanism
+from osimlite.records import dataclass, field
 from osimlite.robot.build import build_robot
 from osimlite.robot.merge_fixed import merge_fixed
 from osimlite.robot.mesh_files import MeshFiles

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass, field
 from osimlite.text import json_lines
 
 LEFT_OUT = "left out"

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from osimlite.errors import ModelError
+from osimlite.records import replace
 from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.schema.actuators import CoordinateActuator
 from osimlite.schema.model import Model

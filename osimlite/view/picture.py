@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -14,6 +13,7 @@ from osimlite.errors import OsimliteError
 from osimlite.meshes import unit_shapes
 from osimlite.meshes.surface import Surface
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass, field
 from osimlite.view.canvas import Canvas
 from osimlite.view.scene import Bodies, Color, Scene
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 from osimlite.view.motion import Motion, at_times, contact_forces
 from osimlite.view.scene import Bodies, Pushed, Scene
 

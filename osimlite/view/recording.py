@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ from osimlite.errors import DocumentError, OsimliteError
 from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass, field
 from osimlite.schema.model import Model
 from osimlite.simulation.files.recorded import RecordedMotion
 from osimlite.simulation.files.storage import StoTable, read_sto

@@ -7,7 +7,6 @@ Bodies are numbered as in the mechanism, -1 is ground.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, NamedTuple, cast
 
@@ -16,6 +15,7 @@ import numpy as np
 from osimlite.meshes.surface import Surface
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 from osimlite.simulation.polylines import Course, Polylines
 
 Color = tuple[float, float, float]

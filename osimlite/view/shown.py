@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from osimlite.meshes.folders import MeshFolders
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.text import listed

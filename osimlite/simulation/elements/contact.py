@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from math import inf
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -12,6 +11,7 @@ from osimlite.errors import ModelError, UnsupportedError
 from osimlite.forces.hunt_crossley import combine_materials, contact_energy
 from osimlite.forces.vectors import cross, minus, plus, vector
 from osimlite.multibody.spatial import Array, offset
+from osimlite.records import dataclass
 from osimlite.schema.contact import ContactEllipsoid, ContactGeometry, ContactHalfSpace, ContactSphere
 from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame

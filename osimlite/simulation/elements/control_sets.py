@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import inf, nextafter
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from osimlite.document.part import read_object
 from osimlite.errors import ModelError
 from osimlite.multibody.functions import Constant, Function, PiecewiseConstant
 from osimlite.multibody.smoothing_spline import PiecewisePolynomial
+from osimlite.records import dataclass
 from osimlite.schema.control_sets import Control, ControlConstant, ControlLinear, ControlSet
 from osimlite.simulation.elements.control_tables import read_controls
 

@@ -6,11 +6,11 @@ A control that nothing drives is 0; what several want of one is added up. OpenSi
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from osimlite.errors import UnsupportedError
 from osimlite.multibody.functions import Function
+from osimlite.records import dataclass, replace
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Unknown
 from osimlite.schema.controller_types import ControlSetController, TrackingController

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from osimlite.errors import ModelError
+from osimlite.records import dataclass
 from osimlite.text import counted, did_you_mean, listed
 
 FUNCTIONS = {

@@ -7,7 +7,6 @@ two meshes are both taken, each with half its area.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, ClassVar, NamedTuple
 
@@ -17,6 +16,7 @@ from osimlite.errors import ModelError
 from osimlite.forces.elastic_foundation import spring_load
 from osimlite.forces.vectors import ZERO, Vector, minus, plus, times
 from osimlite.multibody.spatial import Array, transform
+from osimlite.records import dataclass
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.contact_forces import ElasticFoundationForce
 from osimlite.simulation.elements.contact import (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
@@ -18,6 +17,7 @@ from osimlite.errors import ModelError, SettingError, UnsupportedError
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import FramePlacement, Mechanism
 from osimlite.multibody.schema_functions import numeric
+from osimlite.records import dataclass
 from osimlite.schema.base import Unknown
 from osimlite.schema.forces import Force
 from osimlite.schema.model import Model

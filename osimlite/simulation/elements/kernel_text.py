@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import linecache
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from osimlite.records import dataclass
 from osimlite.simulation.kernels import layout, pointers
 from osimlite.simulation.kernels.condensation import WIDTH
 from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF, RESPONSE

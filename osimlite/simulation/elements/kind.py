@@ -14,12 +14,12 @@ no rates of states, inputs that are kept, what the geometry keeps, and the regis
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, ClassVar
 
+from osimlite.records import dataclass, field
 from osimlite.schema.actuators import Actuator
 from osimlite.simulation.elements.gather import ElementBuilder, module_name, module_of
 from osimlite.simulation.elements.geometries.geometry import Geometry

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from osimlite.errors import ModelError
 from osimlite.multibody.functions import Function
+from osimlite.records import dataclass
 from osimlite.simulation.elements.formula import Formula
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.kernels.controls import with_reflex

@@ -13,13 +13,13 @@ of what the law is given.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody.functions import Function
 from osimlite.quantity import tell
+from osimlite.records import dataclass
 from osimlite.simulation.elements.gather import ElementBuilder, module_name, module_of
 from osimlite.simulation.elements.items import CONTROLS, ForceElement, Item, Places, Silent
 from osimlite.simulation.elements.kernel_text import written

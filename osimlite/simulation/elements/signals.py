@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from osimlite.errors import ModelError
 from osimlite.multibody.functions import Function, PiecewiseLinear
+from osimlite.records import dataclass
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation.elements.control_tables import read_controls
 from osimlite.simulation.elements.gather import ElementBuilder

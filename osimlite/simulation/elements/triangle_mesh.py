@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
@@ -17,6 +16,7 @@ from osimlite.meshes.stl import stl_corners
 from osimlite.meshes.surface import Indices, Polygons
 from osimlite.meshes.vtp import vtp_polygons
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 
 _SAME_POINT = 8.7e-7
 """STL files have no common points; corners nearer than this in every direction are one, as for Simbody (m)."""

@@ -7,10 +7,10 @@ numbers of a state y = (q, u, z) are.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from osimlite.multibody.mechanism import Mechanism
+from osimlite.records import dataclass
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.probe import DeclaredProbe

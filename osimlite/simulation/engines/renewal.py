@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from osimlite.multibody.build import mass_properties
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.mechanism import Mechanism
+from osimlite.records import replace
 from osimlite.schema.base import Component
 from osimlite.schema.controllers import Controller
 from osimlite.schema.forces import Force

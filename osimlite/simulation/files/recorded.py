@@ -6,7 +6,6 @@ The quantities, their names and their order are those of OpenSim's BodyKinematic
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from osimlite.multibody.dynamics import MassCentres
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.multibody.spatial import Array, angles_xyz
+from osimlite.records import dataclass, replace
 from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
 from osimlite.schema.tree import is_a

@@ -6,7 +6,6 @@ import shutil
 import tempfile
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from osimlite.errors import OsimliteError
 from osimlite.files import written_atomically
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass, field
 from osimlite.simulation.files.table_stream import TableStream
 from osimlite.tables import suffixes
 

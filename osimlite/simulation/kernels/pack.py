@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.motions import AxisMotion, Fixed, Motion, SimbodyAccelerationError, SphericalMotion
 from osimlite.multibody.spatial import Array, inverse, rotation_about, skew, transform
+from osimlite.records import dataclass, field
 from osimlite.simulation.constrained import constraints_on, free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.items import CONTROLS, ForceElement, Placement, Places, Response

@@ -7,7 +7,7 @@ joints are where the coordinates are, and those that follow others by an equalit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from numpy.polynomial.polynomial import polyder, polyval
 from osimlite._require import require
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 from osimlite.robot.names import dotted
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle

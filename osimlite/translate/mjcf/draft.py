@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Literal, NamedTuple, TypeVar
@@ -15,6 +14,7 @@ from osimlite.errors import ModelError, SimulationError
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import GROUND, FramePlacement, Mechanism, StationPlacement
 from osimlite.multibody.spatial import Array, quaternion
+from osimlite.records import dataclass, field
 from osimlite.robot.lines import Line
 from osimlite.robot.mesh_files import MeshFiles
 from osimlite.robot.names import dotted

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from lxml.etree import Comment, _Comment, tostring
@@ -15,6 +14,7 @@ from osimlite.errors import SettingError
 from osimlite.meshes.folders import MeshFolders
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Values
+from osimlite.records import dataclass, field
 from osimlite.robot.build import build_robot
 from osimlite.robot.mesh_files import MeshFiles
 from osimlite.robot.names import coordinate_names, legal

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from osimlite._require import require
 from osimlite.multibody.spatial import Array, offset
+from osimlite.records import replace
 from osimlite.translate.mjcf.routes import Router
 from osimlite.translate.mjcf.tendons import Around, Spot, Tendon
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.polynomial import Polynomial
 
 from osimlite.multibody.mechanism import GROUND
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass, field
 from osimlite.schema.forces import Force
 from osimlite.schema.paths import AbstractGeometryPath
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints

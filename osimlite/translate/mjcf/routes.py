@@ -7,13 +7,13 @@ point counts) is decided here once: every way to say it that MuJoCo has is measu
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import chain, combinations, groupby, pairwise, product
 
 import numpy as np
 
 from osimlite.multibody.spatial import Array, rotation_about, transform
+from osimlite.records import dataclass
 from osimlite.simulation.elements.geometries.paths.geometry_path import Node, ThroughPoints
 from osimlite.simulation.kernels.paths import CONDITIONAL, MOVING
 from osimlite.translate.mjcf.moving import composition

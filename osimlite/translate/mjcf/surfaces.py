@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
 from osimlite.multibody.spatial import Array, transform
+from osimlite.records import replace
 from osimlite.simulation.elements.geometries.paths.geometry_path import Surface
 from osimlite.translate.mjcf.tendons import Around, Spot
 

@@ -6,13 +6,13 @@ A tendon runs from site to site, around a surface between two of them at most.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass, replace
 from osimlite.translate.mjcf.poses import Poses, each_pose
 from osimlite.translate.mjcf.wrapping import bend, norm, unit
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from osimlite.forces.bushing import xyz_angles, xyz_moment, xyz_rates
 from osimlite.forces.vectors import minus, put, times, turned, turned_back, vector
 from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places

@@ -5,12 +5,12 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from osimlite.errors import SimulationError
+from osimlite.records import replace
 from osimlite.robot.principal_axes import principal_axes
 from osimlite.robot.robot import Link, Robot
 from osimlite.robot.urdf import urdf_text

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from osimlite.errors import ModelError
 from osimlite.multibody.functions import Function, MultivariatePolynomial, Scaled, WeightedSum
 from osimlite.multibody.schema_functions import numeric
+from osimlite.records import dataclass
 from osimlite.schema.functions import Constant, ExpressionBasedFunction, MultiplierFunction
 from osimlite.simulation.elements.formula import Formula
 from osimlite.simulation.elements.gather import ElementBuilder

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from math import inf
 from typing import Any, ClassVar
 
@@ -16,6 +15,7 @@ import numpy as np
 from osimlite.errors import ModelError
 from osimlite.multibody.functions import Function
 from osimlite.multibody.spatial import Array, offset
+from osimlite.records import dataclass, replace
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.paths import AbstractPathPoint, ConditionalPathPoint, MovingPathPoint, PathPoint
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere, WrapTorus

@@ -6,7 +6,6 @@ forces at points are applied where they belong. So it is here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from osimlite.errors import ModelError
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.spatial import Array, offset
+from osimlite.records import dataclass, replace
 from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactGeometry, ContactSphere, ContactTorus
 from osimlite.schema.scholz_paths import Scholz2015GeometryPathPoint
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of
