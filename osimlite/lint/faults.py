@@ -18,16 +18,9 @@ from typing import NamedTuple
 
 
 class Fault(NamedTuple):
-    """One fault as the docstring of its rule has it.
+    """One fault as the docstring of its rule has it: the end of its code, name, severity, mends, example.
 
-    Attributes:
-        number: the end of its code.
-        name: by which it can be selected and ignored too.
-        severity: of its findings, unless one says otherwise.
-        mends: of what kind its mends are.
-        frame: the document around the example, in which a line with {} stands for that.
-        text: what it finds, as one sentence, and why that is bad.
-        lines: of the example, which begin with `-` if they fail, with `+` if they mend that.
+    In the `frame` a line with {} stands for the `lines` of the example.
     """
 
     number: str

@@ -1,66 +1,54 @@
-"""What is asked for by name: measures, and ways to place a model at the start of a run.
+"""What is asked for by name: measures, and ways to start. Who has some registers them, by the names of the functions.
 
-Who has some registers them with `measure` and `start`, as :mod:`osimlite.sweep.measures` does.
+A measure is made of an engine and the contacts of each foot (None: found by the structure of the model). So is a start:
+a function of states (k, y), the numbers of their engines (None: all those of the engine), and what gives auxiliary
+states their start; it returns the states at which the runs begin. Both raise OsimliteError of a model that has nothing
+of the kind.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 if TYPE_CHECKING:
     from osimlite.sweep.measures import Measure
     from osimlite.sweep.variables import Floats
 
+    Place = Callable[[Floats, Floats | None, Callable[[Floats], Floats]], Floats]
+
 T = TypeVar("T")
+F = TypeVar("F", bound=Callable[..., Any])
 
 PROVIDERS = ("osimlite.sweep.measures", "osimlite.gait.measures")
-"""Modules that register something, by name: a sweep imports none of the others."""
-
-
-class MeasureMaker(Protocol):
-    """Makes a measure for the models of an engine."""
-
-    def __call__(self, engine: Any, feet: Sequence[str] | None) -> Measure:
-        """Make it; raises OsimliteError if the model has nothing of the kind."""
-
-
-class Place(Protocol):
-    """Gives the states (k, y) at which runs start from those that were asked for, for all `numbers` of engines."""
-
-    def __call__(self, states: Floats, numbers: Floats | None, started: Callable[[Floats], Floats]) -> Floats:
-        """Place them; `started` gives auxiliary states their start."""
-
-
-StartMaker = Callable[[Any, Sequence[str] | None], Place]
-"""Makes a place of an engine and the contacts of each foot; OsimliteError if the model has nothing of the kind."""
+"""Modules that register something; one is loaded when those before it have nothing of a name."""
 
 
 class Known(NamedTuple):
     """What makes a measure, and whether a search looks for more of it."""
 
-    make: MeasureMaker
+    make: Callable[[Any, Sequence[str] | None], Measure]
     is_maximized: bool
 
 
 _MEASURES: dict[str, Known] = {}
-_STARTS: dict[str, StartMaker] = {}
+_STARTS: dict[str, Callable[[Any, Sequence[str] | None], Place]] = {}
 
 
-def measure(*, is_maximized: bool = False) -> Callable[[MeasureMaker], MeasureMaker]:
-    """Register a measure by the name of the function that makes it; whether a search looks for more of it."""
+def measure(*, is_maximized: bool = False) -> Callable[[F], F]:
+    """Register what makes a measure."""
 
-    def register(make: Any) -> Any:
+    def register(make: F) -> F:
         _MEASURES[make.__name__] = Known(make, is_maximized)
         return make
 
     return register
 
 
-def start(make: StartMaker) -> StartMaker:
-    """Register a way to start by the name of the function that makes it."""
-    _STARTS[getattr(make, "__name__", "")] = make
+def start(make: F) -> F:
+    """Register what makes a start."""
+    _STARTS[make.__name__] = make
     return make
 
 
@@ -69,8 +57,8 @@ def measure_named(name: str) -> Known | None:
     return _found(_MEASURES, name) if name.isidentifier() else None
 
 
-def start_named(name: str) -> StartMaker:
-    """The way to start of a name."""
+def start_named(name: str) -> Callable[[Any, Sequence[str] | None], Place]:
+    """What makes the start of a name."""
     found = _found(_STARTS, name)
     assert found is not None
     return found

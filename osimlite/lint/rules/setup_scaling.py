@@ -6,53 +6,45 @@ from osimlite.lint.engine import ERROR, Found, rule
 from osimlite.lint.setup import UNGIVEN, Setup, is_given, members
 from osimlite.lint.words import called, nearest_name
 
-_SCALING = """\
+_TOOL = """```setup
 <ScaleTool name="scale">
-    MASS
-    <GenericModelMaker> <model_file>leg.osim</model_file> </GenericModelMaker>
-    <ModelScaler>
-        SCALER
-        <MeasurementSet name="measurements"> <objects>
-            <Measurement name="thigh">
-                PAIRS
-                <BodyScaleSet name="scales"> <objects> AXES </objects> </BodyScaleSet>
-            </Measurement>
-        </objects> </MeasurementSet>
-        <time_range>0 0.5</time_range> <output_model_file>scaled.osim</output_model_file>
-    </ModelScaler>
-    <MarkerPlacer>
-        PLACER
-    </MarkerPlacer>
-</ScaleTool>"""
-_USUAL = {
-    "MASS": "<mass>70</mass>",
-    "SCALER": "<scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>",
-    "PAIRS": '<MarkerPairSet name="pairs"> <objects> <MarkerPair name="thigh"> <markers>asis knee_marker</markers> '
-    "</MarkerPair> </objects> </MarkerPairSet>",
-    "AXES": '<BodyScale name="thigh"> <axes>X Y</axes> </BodyScale>',
-    "PLACER": "<marker_file>leg.trc</marker_file> <time_range>0 0.5</time_range> "
-    "<output_model_file>placed.osim</output_model_file>",
-}
+  <mass>70</mass>
+  <GenericModelMaker> <model_file>leg.osim</model_file> </GenericModelMaker>
+  <ModelScaler>
+    <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
+    <MeasurementSet> <objects> <Measurement name="thigh">
+      <MarkerPairSet> <objects>
+        <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
+      </objects> </MarkerPairSet>
+      <BodyScaleSet> <objects>
+        <BodyScale name="thigh"> <axes>X Y</axes> </BodyScale>
+      </objects> </BodyScaleSet>
+    </Measurement> </objects> </MeasurementSet>
+    <time_range>0 0.5</time_range> <output_model_file>scaled.osim</output_model_file>
+  </ModelScaler>
+  <MarkerPlacer>
+    <marker_file>leg.trc</marker_file> <time_range>0 0.5</time_range> <output_model_file>placed.osim</output_model_file>
+  </MarkerPlacer>
+</ScaleTool>
+```"""
+_LINES = {"mass": 2, "scaler": 5, "pairs": 8, "axes": 11, "placer": 17}
+"""Lines of the tool that examples stand for."""
 
 
-def _scaling(part: str) -> str:
-    """A scale tool, one part of which is that of the example."""
-    text = _SCALING
-    for name, usual in _USUAL.items():
-        text = text.replace(name, "{}" if name == part else usual)
-    text = text.replace("<objects> {} </objects>", "<objects>\n                    {}\n                </objects>")
-    return f"```setup\n{text}\n```"
+def _frame(number: int) -> str:
+    lines = _TOOL.split("\n")
+    lines[number] = " " * (len(lines[number]) - len(lines[number].lstrip())) + "{}"
+    return "\n".join(lines)
 
 
-@rule(
-    "OSIM853", "scale-setting", severity=ERROR, about="document",
-    frames={part.lower(): _scaling(part) for part in _USUAL},
-)  # fmt: skip
+_FRAMES = {name: _frame(number) for name, number in _LINES.items()}
+
+
+@rule("OSIM853", "scale-setting", severity=ERROR, about="document", frames=_FRAMES)
 def scale_setting(setup: Setup, found: Found) -> None:
     """A setting of the scale tool has no effect, or makes it fail.
 
-    Looks at the order of scaling, at measurements without a pair of two different markers, at axes other than X, Y and
-    Z, at the mass, at steps that are left out, and at the times that are averaged.
+    Looks at the mass, the order of scaling, measurements, axes, steps that are left out, and times that are averaged.
 
     A measurement with one marker makes OpenSim crash. What it does not know in `axes` it leaves out without a word, and
     the body keeps its size.
@@ -74,20 +66,13 @@ def scale_setting(setup: Setup, found: Found) -> None:
     - <scaling_order>measurements</scaling_order>
     + <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
     06 measurement-without-pair, warning, in pairs: A measurement has no pair of markers. It measures nothing.
-    - <MarkerPairSet name="pairs"/>
-    + <MarkerPairSet name="pairs"> <objects> <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair> </objects>
-    + </MarkerPairSet>
+    + <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
     07 marker-pair-count, error, in pairs: A pair has other than two markers. OpenSim crashes.
-      <MarkerPairSet name="pairs"> <objects>
-    - <MarkerPair name="first"> <markers>asis</markers> </MarkerPair>
-    + <MarkerPair name="first"> <markers>asis knee_marker</markers> </MarkerPair>
-      </objects> </MarkerPairSet>
-    08 marker-paired-with-itself, warning, in pairs: Both markers of a pair are the same. OpenSim leaves the measurement
-    out.
-      <MarkerPairSet name="pairs"> <objects>
-    - <MarkerPair name="first"> <markers>asis asis</markers> </MarkerPair>
-    + <MarkerPair name="first"> <markers>asis knee_marker</markers> </MarkerPair>
-      </objects> </MarkerPairSet>
+    - <MarkerPair> <markers>asis</markers> </MarkerPair>
+    + <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
+    08 marker-paired-with-itself, warning, in pairs: Both markers of a pair are the same. The measurement is left out.
+    - <MarkerPair> <markers>asis asis</markers> </MarkerPair>
+    + <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
     09 unknown-scale-axis, error, mends safe, in axes: A body is scaled along what is no axis. OpenSim leaves out what
     is not X, Y or Z, without a word, and the body keeps its size.
     - <BodyScale name="thigh"> <axes>X y</axes> </BodyScale>

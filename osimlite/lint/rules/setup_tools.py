@@ -73,11 +73,7 @@ FRAMES = {
 def tool_setting(setup: Setup, found: Found) -> None:
     """A tool has a setting with which it cannot work.
 
-    Looks for accuracies and error tolerances that are not positive or far too large, tools without an analysis,
-    analyses with one name, that are off, or whose step is not positive, static optimization without the model's forces,
-    without an actuator for the joint to ground, or with an exponent of 1 or less, muscles that are analyzed without
-    being in equilibrium, forces that replace those of the model, and forces and
-    controllers that are off.
+    Looks at accuracies and tolerances, steps, analyses, forces that are left out or replaced, and what is off.
 
     Some make OpenSim crash or run for ever, some give other results without a word.
 
