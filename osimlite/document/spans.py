@@ -198,6 +198,10 @@ class PlainSpans(Sequence[Span]):
         close = self.text.find("<", place)
         if self.text[close + 1] == "/":
             return close
+        first = self.text.find(f"</{tag}>", close)
+        if first >= 0 and all(self.text.find(other, close, first) < 0 for other in (f"<{tag}", "<!", "<?")):
+            # As good as always: what stands before it neither nests nor hides one.
+            return first
         depth = 1
         name = re.escape(tag)
         same = re.compile(

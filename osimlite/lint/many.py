@@ -141,9 +141,12 @@ def _processes(jobs: list[Job]) -> int:
 def check_one(job: Job) -> Report:
     """Check one file, and keep what was found."""
     from osimlite.lint.engine import run, subject_of
+    from osimlite.lint.subject import Subject
 
     began = time_ns()
     subject = subject_of(job.file, job.config)
+    if isinstance(subject, Subject) and job.kept_in is not None:
+        subject.kept_in = Cache(job.kept_in).folder
     report = run(subject)
     outside = subject.outside() if job.kept_in is not None else None
     if job.kept_in is not None and outside is not None:

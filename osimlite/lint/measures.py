@@ -6,13 +6,15 @@ above linter and simulation: it is loaded by its name, for a model that has some
 
 from __future__ import annotations
 
+from collections.abc import Container
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from math import degrees
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from osimlite.errors import OsimliteError
+from osimlite.schema.tree import lent
 from osimlite.text import listed
 
 if TYPE_CHECKING:
@@ -141,15 +143,38 @@ class Reach(NamedTuple):
 
 
 class Measures(NamedTuple):
-    """What is measured of a model; paths are looked at in `poses` poses."""
+    """What is measured of a model.
 
-    poses: int
+    Attributes:
+        swept: for each path the places in the mechanism of the coordinates that change its length; in what poses a path
+            is looked at, those of all paths say.
+    """
+
+    swept: dict[str, tuple[int, ...]]
     wrappings: list[Wrapping]
     jumps: list[Jump]
     on_surfaces: list[LengthOnSurface]
     moving_points: list[MovingPoint]
     starts: list[Start]
     reaches: list[Reach]
+
+
+def of_owners(measures: Measures, owners: Container[str]) -> Measures:
+    """What is measured of some paths."""
+    lists: Any = measures[1:]
+    kept = {owner: places for owner, places in measures.swept.items() if owner in owners}
+    return Measures(kept, *([item for item in items if item.owner in owners] for items in lists))
+
+
+def together(one: Measures, two: Measures) -> Measures:
+    """What is measured of these paths and of those."""
+    lists: Any = zip(one[1:], two[1:], strict=True)
+    return Measures(one.swept | two.swept, *([*items, *others] for items, others in lists))
+
+
+def swept_places(measures: Measures) -> set[int]:
+    """Places of the coordinates that change the length of a path."""
+    return {place for places in measures.swept.values() for place in places}
 
 
 def has_measures(subject: Subject) -> bool:
@@ -159,18 +184,35 @@ def has_measures(subject: Subject) -> bool:
 
 def unmeasured(subject: Subject) -> str:
     """Measure a model; why that cannot be done, if it cannot."""
+    from osimlite.lint.parts import parts_of, recall, remember
+
     compiles = sum(1 for _ in subject.named("PathWrap")) > FEW
     missing = [name for name in ("numpy", "numba") if name in absent() and (compiles or name == "numpy")]
     if missing:
         return f"that needs {listed(missing)}; run: pip install 'osimlite[sim]'"
+    parts = parts_of(subject)
+    known = None if parts is None else recall(parts, subject.kept_in)
+    if parts is not None and known is not None:
+        still = known.of(parts)
+        if still.swept.keys() == parts.paths.keys() and swept_places(still) == swept_places(known.measures):
+            subject.kept[MEASURES] = still
+            return ""
     try:
         measured = import_module("osimlite.measuring").measured
-        subject.kept[MEASURES] = measured(subject.model, compiles=compiles)
+        assert subject.model is not None
+        with lent(subject.tree):
+            if parts is not None and known is not None:
+                found = measured(subject.model, compiles=compiles, known=known.measures, still=known.of(parts))
+            else:
+                found = measured(subject.model, compiles=compiles)
     except OsimliteError as error:
         return error.message
     except (ArithmeticError, ValueError) as error:
         # Numbers that other rules have something to say of.
         return f"a number of it is beyond what can be computed with ({error})"
+    subject.kept[MEASURES] = found
+    if parts is not None:
+        remember(parts, found, subject.kept_in)
     return ""
 
 

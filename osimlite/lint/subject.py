@@ -48,7 +48,7 @@ def once(make: Callable[Concatenate[S, P], Made]) -> Callable[Concatenate[S, P],
 class Subject(Checked):
     """One model under check. `source` is None for a model made in Python, `model` for a text that cannot be read.
 
-    `top` is the object at the top of the document, whatever it is.
+    `top` is the object at the top of the document, whatever it is; `kept_in` the folder for what is measured of it.
     """
 
     def __init__(self, found: Survey | Model, config: Config | None = None) -> None:
@@ -60,6 +60,7 @@ class Subject(Checked):
         self.changes: list[Change] = []
         self.refusals: list[Refusal] = []
         self.kept: dict[object, object] = {}
+        self.kept_in: Path | None = None
         if isinstance(found, Model):
             self.model = self.top = found
         else:

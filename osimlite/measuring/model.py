@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from osimlite.lint.measures import LengthOnSurface, Measures, Pose
+from osimlite.lint.measures import LengthOnSurface, Measures, Pose, swept_places, together
 from osimlite.measuring.jumps import jumps
 from osimlite.measuring.muscles import fibers_of, reach_of, start_of
 from osimlite.measuring.points import moving_points
@@ -24,13 +24,15 @@ MIDDLE = 0.5
 
 
 @np.errstate(all="ignore")
-def measured(model: Model, *, compiles: bool) -> Measures:
+def measured(model: Model, *, compiles: bool, known: Measures | None = None, still: Measures | None = None) -> Measures:
     """Measure the paths and muscles of a model.
 
     Args:
         model: what is measured.
         compiles: whether machine code is made that is in no file yet, which takes longer than to do without for a
             model that has few surfaces.
+        known: what was measured when some paths were others, or not there, and all else as it is.
+        still: what of it holds.
 
     Raises:
         UnsupportedError: a path, a joint or a constraint cannot be computed.
@@ -38,20 +40,24 @@ def measured(model: Model, *, compiles: bool) -> Measures:
         SimulationError: the constraints allow no default pose, or there are no lengths in it.
     """
     code = None if compiles else AT_HAND
-    paths = Paths(model, code=code)
+    paths = Paths(model, code=code, left_out=() if still is None else still.swept)
     start = paths.mechanism.assemble({})
     default = np.array(list(paths.lengths(start).values()))
-    looked_at = sweeps(paths, start)
+    looked_at = sweeps(paths, start, set() if still is None else swept_places(still))
+    if known is not None and {sweep.place for sweep in looked_at} != swept_places(known):
+        # All paths are looked at in the same poses.
+        return measured(model, compiles=compiles)
     has_surfaces = any(isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values())
     starts, reaches = [], []
     ends = dict(zip(paths.names, zip(default, _ends(looked_at, default), strict=True), strict=True))
-    for fibers in fibers_of(model, paths.mechanism):
+    for fibers in fibers_of(model, paths.mechanism, ends):
         length, ((shortest, short), (longest, long)) = ends[fibers.path]
         begun = start_of(fibers, length)
         starts += [begun] if begun is not None else []
         reaches += [reach_of(fibers, shortest, True, short), reach_of(fibers, longest, False, long)]
-    return Measures(
-        1 + sum(len(sweep.poses) for sweep in looked_at),
+    moved = {sweep.place: sweep.moved for sweep in looked_at}
+    found = Measures(
+        {name: tuple(place for place, own in moved.items() if own[k]) for k, name in enumerate(paths.names)},
         [*wrappings(paths.around_surfaces(model, GEODESIC, code), paths, start, looked_at)] if has_surfaces else [],
         [*jumps(paths, looked_at)],
         [*_on_surfaces(paths, start, looked_at)],
@@ -59,6 +65,7 @@ def measured(model: Model, *, compiles: bool) -> Measures:
         starts,
         reaches,
     )
+    return found if still is None else together(still, found)
 
 
 def _on_surfaces(paths: Paths, start: Array, looked_at: list[Sweep]) -> Iterator[LengthOnSurface]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import suppress
 from itertools import repeat
 from math import nan
@@ -73,12 +73,18 @@ class Fibers(NamedTuple):
         return found
 
 
-def fibers_of(model: Model, mechanism: Mechanism) -> Iterator[Fibers]:
-    """The muscles that pull, whose laws are given numbers: those of Thelen, Millard, De Groote, Meyer."""
+def fibers_of(model: Model, mechanism: Mechanism, wanted: Container[str]) -> Iterator[Fibers]:
+    """The muscles that pull, whose laws are given numbers: those of Thelen, Millard, De Groote, Meyer.
+
+    Args:
+        model: whose muscles.
+        mechanism: of it.
+        wanted: paths of the muscles that are asked for.
+    """
     builder = ElementBuilder(model, mechanism, Path())
     for muscle in model.components(Muscle):
         kind = kind_of_class(type(muscle))
-        if kind is None or not muscle.appliesForce:
+        if kind is None or not muscle.appliesForce or builder.path(muscle) not in wanted:
             continue
         _, *terms = kind.terms
         if not all(isinstance(term, Fields | Number | Numbers) for term in terms):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from math import pi
 
 import numpy as np
@@ -50,6 +51,12 @@ class Sweep:
         return values
 
     @property
+    def moved(self) -> NDArray[np.bool_]:
+        """Whether the length of each path (p,) changes."""
+        changes: NDArray[np.bool_] = np.nan_to_num(np.ptp(self.lengths, axis=0)) > STILL
+        return changes
+
+    @property
     def info(self) -> CoordinateInfo:
         """The coordinate."""
         return self.paths.mechanism.coordinates[self.place]
@@ -79,8 +86,14 @@ class Sweep:
         return np.clip(np.searchsorted(self.values, values), 1, len(self.values) - 1) - 1
 
 
-def sweeps(paths: Paths, start: Array) -> list[Sweep]:
-    """A sweep of each coordinate that changes the length of a path."""
+def sweeps(paths: Paths, start: Array, others: Container[int] = ()) -> list[Sweep]:
+    """A sweep of each coordinate that changes the length of a path.
+
+    Args:
+        paths: that are looked at.
+        start: the default pose (n,).
+        others: places of coordinates that change the length of a path that is not among these.
+    """
     are_tied, left = tied(paths, start), TIED_POSES
     found: list[tuple[int, Array, bool]] = []
     for place, info in enumerate(paths.mechanism.coordinates):
@@ -99,7 +112,7 @@ def sweeps(paths: Paths, start: Array) -> list[Sweep]:
     for place, poses, is_tied in found:
         own, rows = np.split(rows, [len(poses)])
         swept.append(Sweep(paths, place, poses, is_tied, own))
-    return [sweep for sweep in swept if np.nan_to_num(np.ptp(sweep.lengths, axis=0)).max(initial=0.0) > STILL]
+    return [sweep for sweep in swept if sweep.place in others or sweep.moved.any()]
 
 
 def _poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool) -> Array:

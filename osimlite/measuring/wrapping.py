@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from osimlite.lint.measures import Pose, Wrapping
-from osimlite.measuring.sweeps import STILL, Sweep
+from osimlite.measuring.sweeps import Sweep
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.paths import Paths
 
@@ -40,7 +40,7 @@ def wrappings(geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[S
         around = tuple(surface.tangent.name for surface in getattr(route, "surfaces", ()) if surface.law)
         if not around:
             continue
-        moved = [sweep for sweep in free if np.ptp(sweep.lengths[:, path]) > STILL]
+        moved = [sweep for sweep in free if sweep.moved[path]]
 
         def told(k: int, moved: Sequence[Sweep] = moved) -> tuple[Pose, Array]:
             """A pose as it is told, where coordinates that do not matter are as by default."""

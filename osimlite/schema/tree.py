@@ -6,6 +6,7 @@ The rules by which a text resolves to a component are in :mod:`osimlite.schema.r
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from weakref import WeakSet
@@ -57,6 +58,19 @@ class Use(NamedTuple):
     def text(self) -> str:
         """The text that names something, or the name of a component that is given itself."""
         return self.value if isinstance(self.value, str) else self.value.name
+
+
+@contextmanager
+def lent(tree: Tree) -> Iterator[None]:
+    """Let the model of a tree have it as its own for a while, so that it makes none."""
+    if getattr(tree.model, "_tree", None) is not None:
+        yield
+        return
+    object.__setattr__(tree.model, "_tree", tree)
+    try:
+        yield
+    finally:
+        object.__delattr__(tree.model, "_tree")
 
 
 class Tree:

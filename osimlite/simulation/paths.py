@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -57,6 +57,7 @@ class Paths:
         model: whose paths.
         wrapping: how they bend around surfaces.
         code: what runs the kernels; the best that is installed if left out.
+        left_out: paths of owners whose paths are not wanted.
 
     Attributes:
         system: that computes them.
@@ -67,10 +68,13 @@ class Paths:
 
     _repr_html_ = shown_in_notebooks("paths")
 
-    def __init__(self, model: Model, wrapping: str = OPENSIM, code: Code | None = None) -> None:
+    def __init__(
+        self, model: Model, wrapping: str = OPENSIM, code: Code | None = None, left_out: Container[str] = ()
+    ) -> None:
         mechanism = build_mechanism(model)
         builder = ElementBuilder(model, mechanism, Path(), wrapping=wrapping)
-        self._gather(builder, [owner for owner in builder.tree.components if _has_path(owner)], code)
+        owners = filter(_has_path, builder.tree.components)
+        self._gather(builder, [owner for owner in owners if builder.path(owner) not in left_out], code)
 
     def _gather(self, builder: ElementBuilder, owners: Sequence[Component], code: Code | None) -> None:
         self.mechanism = builder.mechanism

@@ -1,0 +1,139 @@
+"""What was measured is measured again where what it depends on has changed, and nowhere else."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+import osimlite.measuring
+from osimlite.document.source import Source
+from osimlite.lint import Config, measures, parts, validate
+from osimlite.lint.many import check_files
+from osimlite.lint.subject import Subject
+
+FILES = [
+    "OSIM631/fail-02-in-default-and-beyond.osim",
+    "OSIM632/fail-02-two-coordinates.osim",
+    "OSIM633/fail-02-far-side-and-middle.osim",
+    "OSIM634/fail-02-ends-and-rests.osim",
+    "OSIM635/fail-02-slack-and-tense.osim",
+    "OSIM636/fail-02-short-and-long.osim",
+]
+OWNER = re.compile(
+    r"<(PathSpring|Thelen2003Muscle|Millard2012EquilibriumMuscle|DeGrooteFregly2016Muscle) .*?</\1>", re.S
+)
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """The paths that are measured, each time that something is."""
+    found: list[list[str]] = []
+    own = osimlite.measuring.measured
+
+    def measured(model, **given):
+        still = given.get("still")
+        result = own(model, **given)
+        found.append(sorted(set(result.swept) - set(still.swept if still is not None else ())))
+        return result
+
+    monkeypatch.setattr(osimlite.measuring, "measured", measured)
+    parts._memory.clear()
+    return found
+
+
+@pytest.fixture(params=FILES)
+def text(request, fixtures):
+    return (fixtures / "lint" / request.param).read_text()
+
+
+def told(text):
+    return [(item.code, item.message) for item in validate(Source(text.encode()), select="OSIM63")]
+
+
+def fresh(text):
+    parts._memory.clear()
+    return told(text)
+
+
+def test_a_text_is_measured_once(text, asked):
+    assert told(text) == told(text) != []
+    assert len(asked) == 1
+
+
+def test_what_no_path_depends_on_is_not_asked(text, asked):
+    found = told(text)
+    changed = re.sub(r"(<ContactSphere .*?<radius>)0.05", r"\g<1>0.06", text, flags=re.S)
+    assert changed != text
+    assert told(changed) == found
+    assert len(asked) == 1
+
+
+def test_a_path_that_changed_is_measured_alone_and_the_others_are_as_they_were(text, asked):
+    alone = 0
+    for match in OWNER.finditer(text):
+        element = match[0]
+        for old in re.findall(r">(0\.\d+|-0\.\d+)", element)[:3]:
+            changed = text.replace(element, element.replace(f">{old}", f">{1.1 * float(old):.5f}", 1))
+            told(text)
+            once, paths = told(changed), asked[-1]
+            assert once == fresh(changed)
+            assert len(paths) == 1 or paths == asked[-1]
+            alone += len(paths) == 1
+    assert alone
+
+
+def test_a_joint_that_changed_is_one_of_all_paths(fixtures, asked):
+    text = (fixtures / "lint" / "OSIM636" / "fail-02-short-and-long.osim").read_text()
+    told(text)
+    changed = text.replace("<range>-2.1 0</range>", "<range>-1.1 0</range>")
+    assert told(changed) == fresh(changed) != told(text)
+    assert all(len(paths) == len(OWNER.findall(text)) for paths in asked)
+
+
+def test_a_path_more_or_less(asked, fixtures):
+    text = (fixtures / "lint" / "OSIM636" / "fail-02-short-and-long.osim").read_text()
+    every = told(text)
+    (first, *_) = (match[0] for match in OWNER.finditer(text))
+    less = text.replace(first, "")
+    without = told(less)
+    assert len(asked) == 1 and len(without) < len(every)
+    assert told(text) == every
+    assert len(asked) == 1
+    assert fresh(less) == without
+    assert told(text) == every
+    assert len(asked) == 3 and len(asked[-1]) == 1
+
+
+def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch):
+    text = (fixtures / "lint" / "OSIM632" / "fail-02-two-coordinates.osim").read_text()
+    path = tmp_path / "m.osim"
+    (tmp_path / "osimlite.toml").write_text("")
+    path.write_text(text)
+    found = check_files([str(path)], Config()).codes
+    (kept,) = tmp_path.glob(".osimlite_cache/*/measured/*.json")
+    subject = Subject(osimlite.document.survey.survey(Source(text.encode())))
+    own = parts.parts_of(subject)
+    parts._memory.clear()
+    known = parts.recall(own, kept.parents[1])
+    assert known.measures == measures_of(text)
+    for wrong in ("{}", "[]", "x", json.dumps([{}, [1]]), kept.read_text().replace('"poses"', "5")[:-9]):
+        parts._memory.clear()
+        kept.write_text(wrong)
+        assert parts.recall(own, kept.parents[1]) is None
+    parts._memory.clear()
+    assert check_files([str(path)], Config()).codes == found
+
+
+def measures_of(text):
+    parts._memory.clear()
+    subject = Subject(osimlite.document.survey.survey(Source(text.encode())))
+    assert not subject.unmeasured()
+    return measures.measures_of(subject)
+
+
+def test_a_model_whose_classes_stand_elsewhere_has_no_parts(fixtures):
+    text = (fixtures / "lint" / "OSIM632" / "fail-02-two-coordinates.osim").read_text()
+    subject = Subject(osimlite.document.survey.survey(Source(text.encode())), Config(classes=("x.toml",)))
+    assert parts.parts_of(subject) is None
