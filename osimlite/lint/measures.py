@@ -14,7 +14,6 @@ from math import degrees
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from osimlite.errors import OsimliteError
-from osimlite.schema.tree import lent
 from osimlite.text import listed
 
 if TYPE_CHECKING:
@@ -185,6 +184,7 @@ def has_measures(subject: Subject) -> bool:
 def unmeasured(subject: Subject) -> str:
     """Measure a model; why that cannot be done, if it cannot."""
     from osimlite.lint.parts import parts_of, recall, remember
+    from osimlite.schema.tree import lent
 
     compiles = sum(1 for _ in subject.named("PathWrap")) > FEW
     missing = [name for name in ("numpy", "numba") if name in absent() and (compiles or name == "numpy")]

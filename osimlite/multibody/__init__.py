@@ -2,12 +2,28 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
+from osimlite._lazy import imported_when_used
 from osimlite._require import require
 
-require("numpy", extra="sim", purpose="a mechanism")
+if TYPE_CHECKING:
+    from osimlite.multibody.build import build_mechanism as build_mechanism
+    from osimlite.multibody.dynamics import Wrench as Wrench
+    from osimlite.multibody.mechanism import Mechanism as Mechanism
 
-from osimlite.multibody.build import build_mechanism  # noqa: E402
-from osimlite.multibody.dynamics import Wrench  # noqa: E402
-from osimlite.multibody.mechanism import Mechanism  # noqa: E402
+_get = imported_when_used(
+    __name__,
+    {
+        "Mechanism": "osimlite.multibody.mechanism",
+        "Wrench": "osimlite.multibody.dynamics",
+        "build_mechanism": "osimlite.multibody.build",
+    },
+)
 
-__all__ = ["Mechanism", "Wrench", "build_mechanism"]
+
+def __getattr__(name: str) -> Any:
+    # The linter asks which joint carries which body, without numpy.
+    if not name.startswith("_"):
+        require("numpy", extra="sim", purpose="a mechanism")
+    return _get(name)
