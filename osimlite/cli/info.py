@@ -140,7 +140,9 @@ def _files(top: Object, folder: Path) -> Iterator[tuple[str, str]]:
 
 def _classes(objects: Sequence[Object], everything: bool) -> None:
     """Print how many there are of each class."""
-    counts = Counter(getattr(component, "class_name", None) or type(component).__name__ for component in objects)
+    from osimlite.schema.base import Unknown
+
+    counts = Counter(item.class_name if isinstance(item, Unknown) else type(item).__name__ for item in objects)
     _listed("Classes", [f"{count} {name}" for name, count in counts.most_common()], everything)
 
 
