@@ -51,6 +51,9 @@ def test_importing_the_package_alone_imports_nothing_of_weight() -> None:
         (("--version",), {"typer", "rich", "pydantic", "lxml", "dataclasses"}),
         (("validate", "walker.osim"), {"typer", "rich", "pydantic", "lxml", "tempfile"}),
         (("validate", "walker.osim", "--no-cache"), {"typer", "rich", "html", "osimlite.document.repair"}),
+        (("validate", "walker.osim", "--no-cache"), {"numpy", "osimlite.multibody.mechanism"}),
+        (("info", "walker.osim"), {"typer", "rich", "rapidfuzz", "numba", "llvmlite"}),
+        (("simulate", "walker.osim", "--to", "0.1", "-o", "r"), {"typer", "rich", "numba", "osimlite.lint"}),
     ],
 )
 def test_what_a_short_command_leaves_out(
