@@ -1,12 +1,20 @@
-"""Names that every URDF reader takes: letters, digits, ``_``, ``-`` and ``.``, and no two alike."""
+"""Names that readers take: those of URDF letters, digits, ``_``, ``-`` and ``.``, those of MJCF what XML can hold.
+
+No two are alike.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from osimlite.records import replace
 from osimlite.robot.robot import WORLD, Robot
 from osimlite.text import unused
+
+if TYPE_CHECKING:
+    from osimlite.multibody.mechanism import Mechanism
 
 LONGEST = 200
 """Characters in a name; some readers cut lines that are too long."""
@@ -36,16 +44,37 @@ class UniqueNames:
         return word
 
 
+def xml_name(name: str) -> str:
+    """The name with ``_`` for every character that XML has no way to write, and ``_`` for none at all."""
+    return re.sub("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "_", name) or "_"
+
+
+def distinct(names: Sequence[str], spell: Callable[[str], str]) -> list[str]:
+    """The names as they are spelt, no two alike; one that keeps its spelling comes before those that turn into it."""
+    found, taken = [*names], set[str]()
+    for place in sorted(range(len(names)), key=lambda place: spell(names[place]) != names[place]):
+        found[place] = unused(spell(names[place]), taken)
+        taken.add(found[place])
+    return found
+
+
+def joint_names(mechanism: Mechanism) -> list[str]:
+    """Of the joints that are coordinates: the coordinate's name, its path with dots where coordinates share a name."""
+    return distinct(mechanism.coordinate_names, lambda name: xml_name(dotted(name)))
+
+
 def coordinate_names(robot: Robot) -> Robot:
-    """The same robot with joints named by their coordinates: by its path with dots where coordinates share a name."""
-    names = robot.mechanism.coordinate_names
-    own = {joint.name: dotted(names[place]) for place, joint in robot.joint_of.items()}
-    taken = set(own.values())
-    for joint in robot.joints:
-        if joint.name not in own:
-            own[joint.name] = unused(joint.name, taken)
-            taken.add(own[joint.name])
-    return replace(robot, joints=tuple(replace(joint, name=own[joint.name]) for joint in robot.joints))
+    """The same robot with joints named by their coordinates (see :func:`joint_names`), and names that XML can hold."""
+    names = joint_names(robot.mechanism)
+    own = {joint.name: names[place] for place, joint in robot.joint_of.items()}
+    others = [joint.name for joint in robot.joints if joint.name not in own]
+    # Coordinates without a joint may get one.
+    taken = set(names)
+    for name in others:
+        own[name] = unused(xml_name(name), taken)
+        taken.add(own[name])
+    links = [link.name for link in robot.links]
+    return _renamed(robot, dict(zip(links, distinct(links, xml_name), strict=True)), own)
 
 
 def legal_names(robot: Robot) -> Robot:
@@ -53,19 +82,20 @@ def legal_names(robot: Robot) -> Robot:
 
     Links and joints share one set of names, because some readers put both into one namespace.
     """
-    unique = UniqueNames()
-    # Names that are legal already keep their spelling, whatever others turn into.
     names = [link.name for link in robot.links] + [joint.name for joint in robot.joints]
-    renamed = {name: unique(name) for name in names if legal(name) == name}
-    renamed |= {name: unique(name) for name in names if name not in renamed}
-    if renamed == {name: name for name in names}:
-        return robot
+    renamed = dict(zip(names, distinct(names, legal), strict=True))
     assert renamed[WORLD] == WORLD
+    return _renamed(robot, renamed, renamed)
+
+
+def _renamed(robot: Robot, links: Mapping[str, str], joints: Mapping[str, str]) -> Robot:
+    if all(old == new for old, new in (*links.items(), *joints.items())):
+        return robot
     return replace(
         robot,
-        links=tuple(replace(link, name=renamed[link.name]) for link in robot.links),
+        links=tuple(replace(link, name=links[link.name]) for link in robot.links),
         joints=tuple(
-            replace(joint, name=renamed[joint.name], parent=renamed[joint.parent], child=renamed[joint.child])
+            replace(joint, name=joints[joint.name], parent=links[joint.parent], child=links[joint.child])
             for joint in robot.joints
         ),
     )

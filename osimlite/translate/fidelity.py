@@ -91,12 +91,14 @@ class Fidelity:
         target: the format, e.g. ``"urdf"``.
         translated: what became of a component, by absolute path: ``"link Pelvis"``, ``"joint RHip_rz"``.
         records: what the target cannot say.
+        renamed: the names of what a component became, by its path and by kind, where they are not its own.
     """
 
     model: str
     target: str
     translated: dict[str, str] = field(default_factory=dict)
     records: list[Record] = field(default_factory=list)
+    renamed: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def __iter__(self) -> Iterator[Record]:
         return iter(self.records)
@@ -115,6 +117,11 @@ class Fidelity:
     ) -> None:
         """Add a record."""
         self.records.append(Record(kind, component, cannot_say, done, detail, errors or {}))
+
+    def named(self, component: str, kind: str, own: str, name: str) -> None:
+        """Take note of what a thing is called that a component became, if that is not the component's own name."""
+        if name != own:
+            self.renamed.setdefault(component, {})[kind] = name
 
     def groups(self) -> list[Group]:
         """The records, those of one kind that say the same together, in the order of the first of each."""
@@ -159,4 +166,4 @@ class Fidelity:
             for record in self.records
         ]
         content = {"model": self.model, "target": self.target, "records": records, "translated": self.translated}
-        return json_lines(content)
+        return json_lines({**content, "renamed": self.renamed} if self.renamed else content)

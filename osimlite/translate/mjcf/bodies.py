@@ -46,7 +46,8 @@ def add_bodies(draft: Draft) -> None:
             element = _add_chain(draft, chain, link.name)
             _add_inertia(draft, element, link, path, moves=any(part.kind != "fixed" for part in chain))
             if path in draft.tree.by_path:
-                draft.fidelity.translated[path] = f"body {element.get('name')}"
+                draft.fidelity.translated[path] = f"body {link.name}"
+                draft.fidelity.named(path, "body", path.rpartition("/")[2], link.name)
         draft.bodies[bodies[path]] = element
     for component, path in draft.components(Joint):
         names = [part.name for part in robot.moving if part.source == path]
@@ -68,7 +69,7 @@ def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
     moving = [place for place, joint in enumerate(chain) if joint.kind != "fixed"]
     if len(moving) > MOST_JOINTS:
         cut = moving[MOST_JOINTS]
-        carrier = _add_chain(draft, chain[:cut], f"{name}_carrier")
+        carrier = _add_chain(draft, chain[:cut], draft.name("body", f"{name}_carrier"))
         add(carrier, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, LEAST_MASS))
         return _add_chain(draft, chain[cut:], name)
     rest = np.eye(4)

@@ -18,7 +18,7 @@ from osimlite._require import require
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
-from osimlite.robot.names import dotted
+from osimlite.robot.names import joint_names
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.paths import Paths
@@ -145,7 +145,7 @@ class _Compiled:
 
     def __init__(self, mujoco: Any, compiled: Any, paths: Paths) -> None:
         self.mujoco, self.model, self.data = mujoco, compiled, mujoco.MjData(compiled)
-        self.names, self.free = list(map(dotted, paths.mechanism.coordinate_names)), free_coordinates(paths.mechanism)
+        self.names, self.free = joint_names(paths.mechanism), free_coordinates(paths.mechanism)
         kinds = mujoco.mjtObj
         joints = ((k, mujoco.mj_name2id(compiled, kinds.mjOBJ_JOINT, name)) for k, name in enumerate(self.names))
         self.joints = {k: joint for k, joint in joints if joint >= 0}

@@ -13,7 +13,7 @@ from osimlite.multibody.spatial import Array
 from osimlite.robot.drivers import Composed, Driver, coordinate_drivers, joint_driver
 from osimlite.robot.lines import Line
 from osimlite.robot.mimics import couplers, leaders
-from osimlite.robot.names import dotted
+from osimlite.robot.names import joint_names
 from osimlite.robot.robot import RobotJoint
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.bodies import LEAST_MASS
@@ -95,7 +95,7 @@ def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None
 def _argument(draft: Draft, place: int) -> Lead:
     """A joint for a coordinate that is nothing but the argument of functions: it turns a speck about its own middle."""
     info = draft.mechanism.coordinates[place]
-    name = dotted(draft.mechanism.coordinate_names[place])
+    name = joint_names(draft.mechanism)[place]
     # The driver moves joints exactly, whatever equalities make of them.
     inertia = SPECK * SPECK if draft.options.driver else max(SHARE * _inertia(draft, place), SPECK * SPECK)
     speck = draft.speck(name, draft.bodies[GROUND], np.eye(4), inertia)

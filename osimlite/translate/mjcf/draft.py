@@ -10,19 +10,20 @@ from typing import Literal, NamedTuple, TypeVar
 import numpy as np
 from lxml.etree import Element, SubElement, _Element
 
-from osimlite.errors import ModelError, SimulationError
+from osimlite.errors import ModelError, SimulationError, UnsupportedError
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import GROUND, FramePlacement, Mechanism, StationPlacement
 from osimlite.multibody.spatial import Array, quaternion
 from osimlite.records import dataclass, field
 from osimlite.robot.lines import Line
 from osimlite.robot.mesh_files import MeshFiles
-from osimlite.robot.names import dotted
+from osimlite.robot.names import dotted, joint_names, xml_name
 from osimlite.robot.robot import Link, Robot
 from osimlite.robot.urdf import number, numbers
 from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree
+from osimlite.text import unused
 from osimlite.translate.fidelity import Fidelity
 
 Version = Literal[3, 4]
@@ -93,9 +94,22 @@ class Tied(NamedTuple):
     held_out: Array
 
 
+NOT_FINITE = frozenset(("NaN", "Inf", "-Inf"))
+"""How a number is printed that is none."""
+
+
 def add(parent: _Element, tag: str, **attributes: Value) -> _Element:
-    """Add an element; attributes that are None are left out, and ``class_`` stands for ``class``."""
+    """Add an element; attributes that are None are left out, and ``class_`` stands for ``class``.
+
+    Raises:
+        UnsupportedError: a number is not finite, which MJCF cannot say.
+    """
     said = {name.rstrip("_"): text(value) for name, value in attributes.items() if value is not None}
+    for name, words in said.items():
+        if NOT_FINITE.intersection(words.split()) and not isinstance(attributes.get(name), str):
+            raise UnsupportedError(
+                f"MJCF cannot say a number that is not finite: {name} of the {tag} '{said.get('name', '')}' is {words}"
+            )
     return SubElement(parent, tag, said)
 
 
@@ -136,8 +150,13 @@ class Draft:
     tendons: dict[str, Tied] = field(default_factory=dict)
     activations: dict[str, float] = field(default_factory=dict)
     starts: dict[str, float] = field(default_factory=dict)
-    _names: dict[str, set[str]] = field(default_factory=dict)
+    _names: dict[str, set[str | None]] = field(default_factory=dict)
     _meshes: dict[tuple[str, tuple[float, float, float]], str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        # Bodies and joints of the robot have names already, which no other may take.
+        self._names["body"] = {link.name for link in self.robot.links}
+        self._names["joint"] = {*joint_names(self.mechanism), *(joint.name for joint in self.robot.joints)}
 
     @property
     def mechanism(self) -> Mechanism:
@@ -187,13 +206,14 @@ class Draft:
             path: absolute path of the component, or any name.
         """
         taken = self._names.setdefault(kind, set())
-        whole = dotted(path)
-        candidates = [path.rsplit("/", 1)[-1] or whole, whole]
-        count = 1
-        while (name := candidates.pop(0)) in taken:
-            count += 1
-            candidates.append(f"{whole}_{count}")
+        own = path.rsplit("/", 1)[-1]
+        whole = xml_name(dotted(path))
+        name = xml_name(own or whole)
+        if name in taken:
+            name = whole if whole not in taken else unused(whole, taken, first=2)
         taken.add(name)
+        if path in self.tree.by_path:
+            self.fidelity.named(path, kind, own, name)
         return name
 
     def placement(self, owner: Component, socket: str) -> FramePlacement:

@@ -30,9 +30,9 @@ def add_driven(draft: Draft) -> None:
     joint = draft.section("worldbody").find(".//joint")
     if joint is None:
         return
-    idle = {"joint": joint.get("name"), "gainprm": 0, "gear": 0}
+    states, idle = draft.name("actuator", STATES), {"joint": joint.get("name"), "gainprm": 0, "gear": 0}
     for path in forces.controls.names:
         add(draft.section("actuator"), "general", name=draft.name("actuator", path), **idle)
     count = sum(len(element.states) for element in forces.elements)
     if count:
-        add(draft.section("actuator"), "general", name=STATES, dyntype="user", actdim=count, **idle)
+        add(draft.section("actuator"), "general", name=states, dyntype="user", actdim=count, **idle)

@@ -17,7 +17,7 @@ from osimlite.multibody.mechanism import Values
 from osimlite.records import dataclass, field
 from osimlite.robot.build import build_robot
 from osimlite.robot.mesh_files import MeshFiles
-from osimlite.robot.names import coordinate_names, legal
+from osimlite.robot.names import coordinate_names, legal, xml_name
 from osimlite.robot.robot import Robot
 from osimlite.robot.visuals import Visuals, collect_visuals
 from osimlite.schema.model import Model
@@ -167,7 +167,7 @@ def to_mjcf(
 
 def _add_settings(draft: Draft) -> None:
     root = draft.root
-    root.set("model", draft.mechanism.name)
+    root.set("model", xml_name(draft.mechanism.name))
     root.append(Comment(f" Written by osimlite {__version__} for MuJoCo {draft.options.version}. "))
     add(root, "compiler", angle="radian", autolimits=True, inertiafromgeom=False, balanceinertia=False)
     add(root, "option", timestep=STEP, gravity=draft.mechanism.gravity, integrator="implicitfast")
