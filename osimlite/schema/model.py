@@ -100,7 +100,7 @@ class Model(ModelComponent):
         return cast("Tree", known)
 
     def outdate(self) -> None:
-        """Something of the model has changed: its index is to be made anew before it is used again."""
+        """Something of the model is about to change: its index is to be made anew before it is used again."""
         known = getattr(self, "_tree", None)
         if known is not None:
             known.outdate()

@@ -26,6 +26,7 @@ from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:
     from osimlite.schema.model import Model
+    from osimlite.schema.snapshot import Snapshot
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +79,10 @@ class Tree:
 
     def __init__(self, model: Model, previous: Tree | None = None) -> None:
         self.is_current = True
+        self.snapshots: WeakSet[Snapshot] = WeakSet()
+        """Those that are to be taken before the model changes."""
+        self.kept: dict[Any, Any] = {}
+        """What was made of the model as it is, by whatever tells it apart."""
         self._others: WeakSet[Tree] = WeakSet()
         if previous is not None:
             self._others.update(other for other in previous._others if other.is_current)
@@ -109,9 +114,13 @@ class Tree:
         self._known_parts = {}
 
     def outdate(self) -> None:
-        """Something that is in the tree has changed."""
+        """Something that is in the tree is about to change."""
         for tree in (self, *self._others):
-            tree.is_current = False
+            if tree.is_current:
+                for snapshot in list(tree.snapshots):
+                    _ = snapshot.model
+                tree.is_current = False
+                tree.kept.clear()
 
     def _claim(self, owner: Any) -> Model:
         """The model, as the one that an object or a list was last seen in; another may have it too."""

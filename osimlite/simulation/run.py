@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+import weakref
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from math import floor, isfinite
 from numbers import Real
 from pathlib import Path
-from typing import Any
+from threading import RLock
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,14 +20,15 @@ from osimlite.multibody.constraints import Lock
 from osimlite.multibody.dynamics import require_numbers
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import tell_doubt
-from osimlite.schema.model import Model
+from osimlite.schema.model import Model, expect_model
+from osimlite.schema.snapshot import Snapshot
 from osimlite.simulation.constrained import constraints_on, kept_state
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import AUTO, engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, check_integrator
-from osimlite.simulation.options import Options
+from osimlite.simulation.options import PER_RUN, Options
 from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.start import in_units_of, starting, state_in, suspect_value
@@ -33,6 +36,9 @@ from osimlite.simulation.states import in_model_order
 from osimlite.simulation.stepper import Progress, Stepper
 from osimlite.simulation.summary import integration_summary, result_summary, versions
 from osimlite.simulation.trajectory import Interrupted, Report, Trajectory
+
+if TYPE_CHECKING:
+    from osimlite.schema.tree import Tree
 
 QUIET = np.errstate(over="ignore", divide="ignore", invalid="ignore")
 """What is not finite is refused by name where it counts; numpy need not warn of it too."""
@@ -60,11 +66,53 @@ def simulate(model: Model, to: float = 2.0, engine: str = "auto", **choices: Any
             prescribed.
         SettingError: there is no such option, or a setting has no meaning.
         MissingDependency: what the engine works with is not installed.
+
+    What depends on the model alone is computed once and kept until the model changes, so that calls in a loop cost a
+    run each; what reads other files is read every time. Threads may call it with the same model.
     """
-    with Simulation(model, engine, **choices) as simulation:
-        trajectory = simulation.run(to)
+    with _ready(model, engine, choices) as simulation:
+        trajectory = simulation.run(to, **{name: choices[name] for name in PER_RUN if name in choices})
         simulation.hold()
         return trajectory
+
+
+KEPT = 8
+"""So many models that were simulated last stay ready."""
+
+_READY: list[weakref.ref[Tree]] = []
+"""Their trees, the last one last."""
+
+
+@contextmanager
+def _ready(model: Model, engine: str, choices: Mapping[str, Any]) -> Iterator[Simulation]:
+    """A simulation of a model as it is, which stays ready until the model changes.
+
+    While it runs nobody else has it, so that threads do not meet in it; whose run fails is not kept.
+    """
+    expect_model(model)
+    tree, chosen = model.tree(), Options.of(choices)
+    key = (engine, *(getattr(chosen, name) for name in TOLD), chosen.route)
+    is_plain = chosen.external_loads is None and not chosen.show
+    simulation = tree.kept.pop(key, None) if is_plain else None
+    if simulation is None:
+        simulation = Simulation(model, engine, **{name: choices[name] for name in choices if name not in PER_RUN})
+    elif chosen.initial or chosen.initial_speeds:
+        simulation.look_again()
+    try:
+        yield simulation
+    except BaseException:
+        simulation.close()
+        raise
+    # Files may change without a word.
+    if not is_plain or simulation.forces.reads_files or not tree.is_current:
+        simulation.close()
+        return
+    tree.kept[key] = simulation
+    _READY[:] = [known for known in _READY if known() not in (None, tree)] + [weakref.ref(tree)]
+    if len(_READY) > KEPT:
+        longest_ago = _READY.pop(0)()
+        if longest_ago is not None:
+            longest_ago.kept.clear()
 
 
 TOLD = "skip_unsupported", "simbody_early_return", "own_activation_times", "wrapping", "opensim_derivatives", "rolling"
@@ -88,7 +136,6 @@ class Simulation:
     Errors are those of :func:`simulate`.
 
     Attributes:
-        model: a copy of what moves.
         options: that were chosen.
         constraints: names of what the coordinates of the state must fulfil.
         paths: of all states, in the order of OpenSim.
@@ -102,7 +149,8 @@ class Simulation:
             model, opensim_derivatives=chosen.opensim_derivatives, rolling=chosen.rolling
         )
         # What becomes of the model later changes neither runs nor what is shown of them.
-        self.model = model.copy_deep()
+        self._snapshot = Snapshot(model.tree())
+        self._lock = RLock()
         _require_finite_start(self.mechanism)
         self.forces = force_elements(
             model,
@@ -133,6 +181,11 @@ class Simulation:
         self._start: tuple[Any, tuple[list[float], list[float]]] | None = None
         self._has_inertia = False
 
+    @property
+    def model(self) -> Model:
+        """A copy of what moves."""
+        return self._snapshot.model
+
     def run(self, to: float = 2.0, **choices: Any) -> Trajectory:
         """Simulate once.
 
@@ -142,8 +195,11 @@ class Simulation:
 
         Errors are those of :func:`simulate`.
         """
+        with self._lock:
+            return self._run(to, self.options.for_run(choices))
+
+    def _run(self, to: float, chosen: Options) -> Trajectory:
         started = time.perf_counter()
-        chosen = self.options.for_run(choices)
         fixed_step, initial = chosen.fixed_step, chosen.initial
         times = report_times(to, chosen.report_interval)
         if fixed_step is not None:
@@ -205,6 +261,10 @@ class Simulation:
         if stepper.ended is not None:
             raise Interrupted(trajectory)
         return trajectory
+
+    def look_again(self) -> None:
+        """Have the next start checked, too, for motions without inertia."""
+        self._has_inertia = False
 
     def hold(self) -> None:
         """Keep the last pose in the window until somebody closes it; nothing without a window."""
@@ -291,35 +351,38 @@ class Simulation:
         wall: float,
         controls: Controls,
     ) -> Trajectory:
-        def engine() -> Engine:
-            """The engine as it was in this run: since then there may have been others."""
-            self.engine.drive(controls)
-            return self.engine
+        def asked(what: Callable[[Engine], Any]) -> Any:
+            """What the engine says, as it was in this run: since then there may have been others."""
+            with self._lock:
+                self.engine.drive(controls)
+                return what(self.engine)
 
-        def summary() -> dict[str, Any]:
+        def summary(engine: Engine) -> dict[str, Any]:
             return {
                 "model": self.mechanism.name,
-                "engine": self.engine.name,
-                "route": self.engine.route,
+                "engine": engine.name,
+                "route": engine.route,
                 **integration_summary(stepper, settings, wall),
-                **result_summary(engine(), recorder, (times[0], states[0]), (times[-1], states[-1])),
+                **result_summary(engine, recorder, (times[0], states[0]), (times[-1], states[-1])),
                 "skipped_forces": list(self.forces.skipped),
                 "constraints": self.constraints,
-                "versions": versions(self.engine),
+                "versions": versions(engine),
             }
 
         report = Report(
-            lambda: (self.engine.columns, list(map(engine().force_records, times, states))),
-            lambda: list(map(engine().energies, times, states)),
-            lambda: (
-                probe_labels(self.engine.probes),
-                list(probe_rows(engine(), list(zip(times, states, strict=True)), recorder.steps())),
+            lambda: asked(lambda engine: (engine.columns, list(map(engine.force_records, times, states)))),
+            lambda: asked(lambda engine: list(map(engine.energies, times, states))),
+            lambda: asked(
+                lambda engine: (
+                    probe_labels(engine.probes),
+                    list(probe_rows(engine, list(zip(times, states, strict=True)), recorder.steps())),
+                )
             ),
-            summary,
+            lambda: asked(summary),
         )
         values, speeds = self.state.histories(states)
         auxiliary = self.state.auxiliary_histories(states)
-        return Trajectory(self.mechanism, times, values, speeds, report, auxiliary, self.paths, self.model)
+        return Trajectory(self.mechanism, times, values, speeds, report, auxiliary, self.paths, self._snapshot)
 
 
 @QUIET

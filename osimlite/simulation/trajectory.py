@@ -17,6 +17,7 @@ from osimlite.files import make_folder, write_atomically
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
+from osimlite.schema.snapshot import Snapshot
 from osimlite.simulation.files.storage import sto_text
 from osimlite.simulation.tabular import Tabular
 from osimlite.text import json_lines
@@ -36,7 +37,6 @@ class Trajectory(Tabular):
         auxiliary: other states that are integrated (n,), by their paths in OpenSim: the energy, J, that the dampers of
             a BushingForce have taken up, or of a CoordinateLimitForce that is to compute it.
         paths: of all states, in the order of OpenSim: ".../value" and ".../speed" of the coordinates, and `auxiliary`.
-        model: a copy of what was simulated, if that is known: notebooks show it.
     """
 
     _repr_html_ = shown_in_notebooks("trajectory")
@@ -50,10 +50,10 @@ class Trajectory(Tabular):
         report: Report,
         auxiliary: Mapping[str, ArrayLike] = MappingProxyType({}),
         paths: Sequence[str] = (),
-        model: Model | None = None,
+        model: Model | Snapshot | None = None,
     ) -> None:
         count = len(mechanism.coordinates)
-        self.mechanism, self.model = mechanism, model
+        self.mechanism, self._model = mechanism, model
         self.times: Array = np.array(times, dtype=float)
         self.coordinates = mechanism.coordinate_names
         self.values: Array = np.array(values, dtype=float).reshape(len(self.times), count)
@@ -65,6 +65,11 @@ class Trajectory(Tabular):
         self.auxiliary: dict[str, Array] = {path: np.array(auxiliary[path], dtype=float) for path in ordered}
         self._report: Report | None = report
 
+    @property
+    def model(self) -> Model | None:
+        """A copy of what was simulated, if that is known: notebooks show it."""
+        return self._model.model if isinstance(self._model, Snapshot) else self._model
+
     def __repr__(self) -> str:
         return (
             f"Trajectory of '{self.mechanism.name}': {len(self.times)} moments from {self.times[0]:g} to "
@@ -74,7 +79,7 @@ class Trajectory(Tabular):
     def __getstate__(self) -> dict[str, Any]:
         # What the report needs to work anything out cannot go to another process.
         _ = self.forces, self.energy, self.probes, self.summary
-        return {**self.__dict__, "_report": None}
+        return {**self.__dict__, "_report": None, "_model": self.model}
 
     @cached_property
     def forces(self) -> Mapping[str, Array]:

@@ -37,11 +37,15 @@ WRAPPINGS = OPENSIM, GEODESIC = "opensim", "geodesic"
 
 @dataclass(frozen=True)
 class Forces:
-    """The force elements of a model, then its probes; forces that were left out, as ``path (class)``; all controls."""
+    """The force elements of a model, then its probes; forces that were left out, as ``path (class)``; all controls.
+
+    `reads_files` tells whether any of them is of more than the model: of a mesh, of measured loads or controls.
+    """
 
     elements: tuple[ForceElement, ...]
     skipped: tuple[str, ...] = ()
     controls: Controls = NO_CONTROLS
+    reads_files: bool = False
 
 
 @np.errstate(over="ignore", divide="ignore", invalid="ignore")
@@ -97,7 +101,8 @@ def force_elements(
     from osimlite.simulation.elements.probe import probe_elements
 
     elements += probe_elements(builder, elements)
-    return Forces(tuple(elements), tuple(skipped), builder.controls.controls)
+    controls, reads_files = builder.controls.controls, builder.reads_files or external_loads is not None
+    return Forces(tuple(elements), tuple(skipped), controls, reads_files)
 
 
 FEW = 4
@@ -121,7 +126,7 @@ class ElementBuilder:
     Attributes:
         tree: of the model.
         mechanism: of the model.
-        folder: of the model's file.
+        reads_files: whether anything has asked for a file.
         drives: what controllers do, by their paths, of those that have been asked.
         early_return: whether Simbody's defect in contact is reproduced.
         own_times: whether OpenSim's defect in activation is not.
@@ -145,10 +150,16 @@ class ElementBuilder:
         self.model = model
         self.tree = model.tree()
         self.mechanism = mechanism
-        self.folder = folder
+        self._folder, self.reads_files = folder, False
         self._of: dict[type, list[Any]] = {}
         self.drives: dict[str, list[Drive]] = {}
         self.early_return, self.own_times, self.geodesic = early_return, own_times, wrapping == GEODESIC
+
+    @property
+    def folder(self) -> Path:
+        """Of the model's file: of what stands beside it."""
+        self.reads_files = True
+        return self._folder
 
     @property
     def mesh_folders(self) -> MeshFolders:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -79,6 +80,8 @@ class World:
         exact: bool = True,
     ) -> None:
         self.client = _connect()
+        # Worlds are few: who forgets to close one leaves it to the garbage collector.
+        self._leave = weakref.finalize(self, bullet.disconnect, self.client)
         self._step = 0.0
         self._exact = exact
         try:
@@ -174,7 +177,7 @@ class World:
     def close(self) -> None:
         """Leave the world."""
         if self.client >= 0:
-            bullet.disconnect(self.client)
+            self._leave()
             self.client = -1
 
 
