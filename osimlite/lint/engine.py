@@ -187,20 +187,22 @@ def rule(
     thresholds: tuple[Threshold, ...] = (),
     mends: Mends = "",
     about: str = "model",
+    faults: str = "",
     frames: Mapping[str, str] | None = None,
 ) -> Callable[[Check], Check]:
     """Register a function as the rule `code`; the other arguments are those of :class:`Rule`.
 
-    With `frames` it is a group: its docstring lists faults (:mod:`osimlite.lint.faults`), whose examples stand in them.
+    With `faults` it is a group: these are listed as :mod:`osimlite.lint.faults` says, with examples that stand in
+    `frames`.
     """
 
     def register(check: Check) -> Check:
         whole = Rule(code, name, severity, check, before, thresholds, mends, about)
-        if frames is None:
+        if not faults:
             _add(_RULES, whole)
             return check
         _add(_GROUPS, whole)
-        for fault in faults_in(cleandoc(check.__doc__ or ""), frames):
+        for fault in faults_in(faults, frames or {}):
             own: Any = {"code": code + fault.number, "name": fault.name, "mends": fault.mends, "group": name}
             _add(_RULES, replace(whole, severity=Severity(fault.severity), fault=fault, **own))
         return check

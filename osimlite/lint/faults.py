@@ -1,6 +1,6 @@
 """The faults that one rule tells apart: each has a code, a name and a page of its own, so that it can be ignored alone.
 
-They stand in the docstring of the rule, behind what is said of all of them::
+They are listed beside the rule::
 
     01 loose-accuracy, warning, in ik: Inverse kinematics hardly fits poses. It stops where the error is still large.
     - <accuracy>0.5</accuracy>
@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 
 class Fault(NamedTuple):
-    """One fault as the docstring of its rule has it: the end of its code, name, severity, mends, example.
+    """One fault as its rule lists it: the end of its code, name, severity, mends, example.
 
     In the `frame` a line with {} stands for the `lines` of the example.
     """
@@ -52,10 +52,10 @@ class Fault(NamedTuple):
         return before + start + "".join(f"{margin}{line}\n" for line in lines) + after
 
 
-def faults_in(docstring: str, frames: Mapping[str, str]) -> Iterator[Fault]:
-    """The faults that the docstring of a rule lists; `frames` are the documents of their examples by name."""
+def faults_in(listed: str, frames: Mapping[str, str]) -> Iterator[Fault]:
+    """The faults that a rule lists; `frames` are the documents of their examples by name."""
     parts: list[tuple[str, list[str], list[str]]] = []
-    for line in docstring.split("\n\n", 3)[3].splitlines():
+    for line in listed.splitlines():
         if line[:2].isdigit():
             head, _, text = line.partition(": ")
             parts.append((head, [text], []))

@@ -40,7 +40,51 @@ def _frame(number: int) -> str:
 _FRAMES = {name: _frame(number) for name, number in _LINES.items()}
 
 
-@rule("OSIM853", "scale-setting", severity=ERROR, about="document", frames=_FRAMES)
+_FAULTS = """\
+01 mass-not-scaled, warning, in mass: The mass to scale to is not positive. OpenSim leaves the mass as it is.
+- <mass>0</mass>
++ <mass>70</mass>
+02 model-not-scaled, warning, in scaler: The model scaler does not apply. The model is not scaled.
+- <apply>false</apply>
+  <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
+03 unknown-scaling, error, mends unsafe, in scaler: The scaling order has a word for no way of scaling. OpenSim knows
+measurements and manualScale, and refuses others.
+- <scaling_order>measurement</scaling_order> <marker_file>leg.trc</marker_file>
++ <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
+04 manual-scale-overwritten, warning, in scaler: Measurements come after what is scaled by hand. They overwrite it.
+- <scaling_order>manualScale measurements</scaling_order> <marker_file>leg.trc</marker_file>
++ <scaling_order>measurements manualScale</scaling_order> <marker_file>leg.trc</marker_file>
+05 measured-without-markers, warning, in scaler: A scaler measures and is given no markers. Nothing is measured.
+- <scaling_order>measurements</scaling_order>
++ <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
+06 measurement-without-pair, warning, in pairs: A measurement has no pair of markers. It measures nothing.
++ <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
+07 marker-pair-count, error, in pairs: A pair has other than two markers. OpenSim crashes.
+- <MarkerPair> <markers>asis</markers> </MarkerPair>
++ <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
+08 marker-paired-with-itself, warning, in pairs: Both markers of a pair are the same. The measurement is left out.
+- <MarkerPair> <markers>asis asis</markers> </MarkerPair>
++ <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
+09 unknown-scale-axis, error, mends safe, in axes: A body is scaled along what is no axis. OpenSim leaves out what is
+not X, Y or Z, without a word, and the body keeps its size.
+- <BodyScale name="thigh"> <axes>X y</axes> </BodyScale>
++ <BodyScale name="thigh"> <axes>X Y</axes> </BodyScale>
+10 markers-not-placed, warning, in placer: The marker placer does not apply. The tool says that it failed.
+- <apply>false</apply>
+  <marker_file>leg.trc</marker_file> <time_range>0 0.5</time_range>
+  <output_model_file>placed.osim</output_model_file>
+11 placed-model-not-written, warning, in placer: The model with its markers placed is not written. All that the tool did
+is lost.
+  <marker_file>leg.trc</marker_file> <time_range>0 0.5</time_range>
++ <output_model_file>placed.osim</output_model_file>
+12 static-times, error, in placer: The times of the static trial are none to average over. OpenSim fails.
+  <marker_file>leg.trc</marker_file> <output_model_file>placed.osim</output_model_file>
+- <time_range>0.5 0.5</time_range>
++ <time_range>0 0.5</time_range>
+"""
+
+
+@rule("OSIM853", "scale-setting", severity=ERROR, about="document", faults=_FAULTS, frames=_FRAMES)
 def scale_setting(setup: Setup, found: Found) -> None:
     """A setting of the scale tool has no effect, or makes it fail.
 
@@ -48,47 +92,6 @@ def scale_setting(setup: Setup, found: Found) -> None:
 
     A measurement with one marker makes OpenSim crash. What it does not know in `axes` it leaves out without a word, and
     the body keeps its size.
-
-    01 mass-not-scaled, warning, in mass: The mass to scale to is not positive. OpenSim leaves the mass as it is.
-    - <mass>0</mass>
-    + <mass>70</mass>
-    02 model-not-scaled, warning, in scaler: The model scaler does not apply. The model is not scaled.
-    - <apply>false</apply>
-      <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
-    03 unknown-scaling, error, mends unsafe, in scaler: The scaling order has a word for no way of scaling. OpenSim
-    knows measurements and manualScale, and refuses others.
-    - <scaling_order>measurement</scaling_order> <marker_file>leg.trc</marker_file>
-    + <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
-    04 manual-scale-overwritten, warning, in scaler: Measurements come after what is scaled by hand. They overwrite it.
-    - <scaling_order>manualScale measurements</scaling_order> <marker_file>leg.trc</marker_file>
-    + <scaling_order>measurements manualScale</scaling_order> <marker_file>leg.trc</marker_file>
-    05 measured-without-markers, warning, in scaler: A scaler measures and is given no markers. Nothing is measured.
-    - <scaling_order>measurements</scaling_order>
-    + <scaling_order>measurements</scaling_order> <marker_file>leg.trc</marker_file>
-    06 measurement-without-pair, warning, in pairs: A measurement has no pair of markers. It measures nothing.
-    + <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
-    07 marker-pair-count, error, in pairs: A pair has other than two markers. OpenSim crashes.
-    - <MarkerPair> <markers>asis</markers> </MarkerPair>
-    + <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
-    08 marker-paired-with-itself, warning, in pairs: Both markers of a pair are the same. The measurement is left out.
-    - <MarkerPair> <markers>asis asis</markers> </MarkerPair>
-    + <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
-    09 unknown-scale-axis, error, mends safe, in axes: A body is scaled along what is no axis. OpenSim leaves out what
-    is not X, Y or Z, without a word, and the body keeps its size.
-    - <BodyScale name="thigh"> <axes>X y</axes> </BodyScale>
-    + <BodyScale name="thigh"> <axes>X Y</axes> </BodyScale>
-    10 markers-not-placed, warning, in placer: The marker placer does not apply. The tool says that it failed.
-    - <apply>false</apply>
-      <marker_file>leg.trc</marker_file> <time_range>0 0.5</time_range>
-      <output_model_file>placed.osim</output_model_file>
-    11 placed-model-not-written, warning, in placer: The model with its markers placed is not written. All that the tool
-    did is lost.
-      <marker_file>leg.trc</marker_file> <time_range>0 0.5</time_range>
-    + <output_model_file>placed.osim</output_model_file>
-    12 static-times, error, in placer: The times of the static trial are none to average over. OpenSim fails.
-      <marker_file>leg.trc</marker_file> <output_model_file>placed.osim</output_model_file>
-    - <time_range>0.5 0.5</time_range>
-    + <time_range>0 0.5</time_range>
     """
     for tool in setup.named("ScaleTool"):
         scaler = tool.model_scaler

@@ -38,8 +38,42 @@ _FRAMES = {
 }
 
 
+_FAULTS = """\
+01 time-count, error, in dynamics: A range of times has other than two. With less the tool fails, of more OpenSim takes
+the first two.
+- <time_range>0</time_range>
++ <time_range>0 0.5</time_range>
+02 few-rows, error, in any: A motion has less than six rows. OpenSim lays a spline through six at least.
+- <coordinates_file>short.mot</coordinates_file>
++ <coordinates_file>leg.mot</coordinates_file>
+03 impossible-times, error, in dynamics: A tool or an analysis ends before it begins, or at no number. It fails, or goes
+by other times.
+- <time_range>0.5 0</time_range>
++ <time_range>0 0.5</time_range>
+04 too-short-for-control, error, in control: Computed muscle control has too little time. It needs 0.03 s for the first
+states, and one window.
+- <initial_time>0</initial_time> <final_time>0.02</final_time>
++ <initial_time>0</initial_time> <final_time>0.5</final_time>
+05 no-data-at-times, error, in dynamics: A tool runs wholly before or after its data. It fails or crashes.
+- <time_range>5 6</time_range>
++ <time_range>0 0.5</time_range>
+06 stops-at-default, warning, in ik: A tool is given no end and its data go on. Inverse kinematics stops at 2 s: OpenSim
+4.6 means to take all there is, and does not.
+- <marker_file>slow.trc</marker_file>
++ <marker_file>slow.trc</marker_file> <time_range>0 2.5</time_range>
+07 data-end-early, warning, in dynamics: The data end before the tool does. Some tools stop there without a word, others
+go on as a spline does.
+- <time_range>0 9</time_range>
++ <time_range>0 0.5</time_range>
+08 data-begin-late, warning, in dynamics: The data begin after the tool does. Some tools begin there without a word,
+others before, as a spline does.
+- <time_range>-1 0.5</time_range>
++ <time_range>0 0.5</time_range>
+"""
+
+
 @rule(
-    "OSIM844", "time-outside-data", severity=WARNING, about="document",
+    "OSIM844", "time-outside-data", severity=WARNING, about="document", faults=_FAULTS,
     frames={name: f"```setup\n{frame}\n```" for name, frame in _FRAMES.items()},
 )  # fmt: skip
 def time_outside_data(setup: Setup, found: Found) -> None:
@@ -51,37 +85,6 @@ def time_outside_data(setup: Setup, found: Found) -> None:
     Inverse kinematics cuts the times to the data without a word. Without a time range it stops at 2 s: OpenSim 4.6
     means to take all there is, and does not. Loads that end before the motion go on as their spline leaves them. Times
     in the wrong order, or wholly outside the data (an error), make the tools fail or crash.
-
-    01 time-count, error, in dynamics: A range of times has other than two. With less the tool fails, of more OpenSim
-    takes the first two.
-    - <time_range>0</time_range>
-    + <time_range>0 0.5</time_range>
-    02 few-rows, error, in any: A motion has less than six rows. OpenSim lays a spline through six at least.
-    - <coordinates_file>short.mot</coordinates_file>
-    + <coordinates_file>leg.mot</coordinates_file>
-    03 impossible-times, error, in dynamics: A tool or an analysis ends before it begins, or at no number. It fails, or
-    goes by other times.
-    - <time_range>0.5 0</time_range>
-    + <time_range>0 0.5</time_range>
-    04 too-short-for-control, error, in control: Computed muscle control has too little time. It needs 0.03 s for the
-    first states, and one window.
-    - <initial_time>0</initial_time> <final_time>0.02</final_time>
-    + <initial_time>0</initial_time> <final_time>0.5</final_time>
-    05 no-data-at-times, error, in dynamics: A tool runs wholly before or after its data. It fails or crashes.
-    - <time_range>5 6</time_range>
-    + <time_range>0 0.5</time_range>
-    06 stops-at-default, warning, in ik: A tool is given no end and its data go on. Inverse kinematics stops at 2 s:
-    OpenSim 4.6 means to take all there is, and does not.
-    - <marker_file>slow.trc</marker_file>
-    + <marker_file>slow.trc</marker_file> <time_range>0 2.5</time_range>
-    07 data-end-early, warning, in dynamics: The data end before the tool does. Some tools stop there without a word,
-    others go on as a spline does.
-    - <time_range>0 9</time_range>
-    + <time_range>0 0.5</time_range>
-    08 data-begin-late, warning, in dynamics: The data begin after the tool does. Some tools begin there without a word,
-    others before, as a spline does.
-    - <time_range>-1 0.5</time_range>
-    + <time_range>0 0.5</time_range>
     """
     for item in setup.having("time_range"):
         count = len(item.time_range)

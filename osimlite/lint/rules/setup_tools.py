@@ -69,107 +69,109 @@ FRAMES = {
 """What the examples of OSIM852 stand in."""
 
 
-@rule("OSIM852", "tool-setting", severity=ERROR, about="document", frames=FRAMES)
+_FAULTS = """\
+01 pose-accuracy, warning, in ik: The accuracy of inverse kinematics is above 0.01, or 0. Poses are hardly fitted, or
+the search does not end.
+- <accuracy>0.5</accuracy>
++ <accuracy>1e-5</accuracy>
+02 few-integrator-steps, warning, in forward: A tool may take less than 10 steps. The run ends before its time.
+- <maximum_number_of_integrator_steps>5</maximum_number_of_integrator_steps>
++ <maximum_number_of_integrator_steps>5000</maximum_number_of_integrator_steps>
+03 step-interval, warning, in kinematics: A step interval is below 1. It says after how many steps there is a row.
+- <step_interval>0</step_interval>
++ <step_interval>1</step_interval>
+04 unnamed-point, warning, in point: The kinematics of a point are asked for without a name of it. The files of the
+results are called by that name.
+- <point_name></point_name>
++ <point_name>heel</point_name>
+05 without-model-forces, error, in optimization: The forces of the model are to be left out. OpenSim crashes.
+- <use_model_force_set>false</use_model_force_set>
++ <use_model_force_set>true</use_model_force_set>
+06 activation-exponent, warning, in optimization: The exponent of activations is 1 or less. Their sum is then no measure
+that has one smallest value.
+- <activation_exponent>1</activation_exponent>
++ <activation_exponent>2</activation_exponent>
+07 few-optimizer-iterations, warning, in optimization: The optimizer has under 10 iterations. It stops too early.
+- <optimizer_max_iterations>5</optimizer_max_iterations>
++ <optimizer_max_iterations>100</optimizer_max_iterations>
+08 loose-optimizer-convergence, warning, in optimization: The optimizer may stop far from its goal. With a criterion
+above 0.05 activations stay as they come.
+- <optimizer_convergence_criterion>0.5</optimizer_convergence_criterion>
++ <optimizer_convergence_criterion>1e-4</optimizer_convergence_criterion>
+09 integrator-error-tolerance, error, in forward: The error tolerance of the integrator is not positive. It is never
+met, and OpenSim runs for ever.
+- <integrator_error_tolerance>0</integrator_error_tolerance>
++ <integrator_error_tolerance>1e-5</integrator_error_tolerance>
+10 no-residual-forces, error, in rra: Residual reduction is given no forces. It controls what force_set_files have, and
+fails without them.
+  <replace_force_set>true</replace_force_set>
++ <force_set_files>residuals.xml</force_set_files>
+11 replaced-forces, warning, in analyze: The forces of the model are replaced. Its muscles are gone, and what is
+computed is that of another model.
+- <replace_force_set>true</replace_force_set>
++ <replace_force_set>false</replace_force_set>
+  <AnalysisSet name="analyses"> <objects> <Kinematics name="kinematics"/> </objects> </AnalysisSet>
+12 muscles-left-in-model, error, in rra: Residual reduction leaves the muscles in the model. OpenSim crashes.
+  <force_set_files>residuals.xml</force_set_files>
+- <replace_force_set>false</replace_force_set>
++ <replace_force_set>true</replace_force_set>
+13 no-adjusted-body, error, in rra: A center of mass is to be moved, of no body. OpenSim refuses the setup.
+  <force_set_files>residuals.xml</force_set_files> <replace_force_set>true</replace_force_set>
+  <adjust_com_to_reduce_residuals>true</adjust_com_to_reduce_residuals>
+  <output_model_file>adjusted.osim</output_model_file>
++ <adjusted_com_body>thigh</adjusted_com_body>
+14 no-analysis, error, in analyze: An analyze tool has no analysis. OpenSim refuses it.
++ <AnalysisSet name="analyses"> <objects> <Kinematics name="kinematics"/> </objects> </AnalysisSet>
+15 analysis-off, info, in kinematics: An analysis is off. It writes nothing.
+- <on>false</on>
+16 analyses-of-one-name, warning, in analyses: Two analyses have one name. They write to the same files.
+- <Kinematics name="run"/> <Kinematics name="run"/>
++ <Kinematics name="run"/> <Kinematics name="again"/>
+17 unactuated-root, warning, in analyses: No actuator moves the coordinates between the model and ground. Static
+optimization fails without residual actuators.
+- <StaticOptimization name="optimization"/>
++ <Kinematics name="kinematics"/>
+18 nothing-analyzed, warning, in kinematics: An analysis names no body or coordinate. Nothing is written.
+- <coordinates></coordinates>
++ <coordinates>all</coordinates>
+19 fibers-not-in-equilibrium, warning, in analyze: Muscles are analyzed at coordinates without equilibrium. Fibers stay
+at their default lengths, of which the coordinates tell nothing.
+  <AnalysisSet name="analyses"> <objects> <MuscleAnalysis name="muscles"/> </objects> </AnalysisSet>
+- <solve_for_equilibrium_for_auxiliary_states>false</solve_for_equilibrium_for_auxiliary_states>
++ <solve_for_equilibrium_for_auxiliary_states>true</solve_for_equilibrium_for_auxiliary_states>
+20 no-moment-arm-coordinate, error, in muscles: A muscle analysis names no coordinate for moment arms. OpenSim fails.
+- <moment_arm_coordinate_list></moment_arm_coordinate_list>
++ <moment_arm_coordinate_list>all</moment_arm_coordinate_list>
+21 reaction-on-neither, error, mends unsafe, in reaction: A joint reaction is asked for on neither child nor parent.
+OpenSim knows these two words only, and refuses others.
+- <apply_on_bodies>childs</apply_on_bodies>
++ <apply_on_bodies>child</apply_on_bodies>
+22 reaction-count, error, in reaction: Joints and the bodies that their reactions act on differ in number. OpenSim takes
+none, one for all, or one for each, and refuses else.
+- <apply_on_bodies>child parent child</apply_on_bodies>
++ <apply_on_bodies>child parent</apply_on_bodies>
+23 force-of-one-name, warning, in forces: A force that a tool adds is called as one of the model. It takes the place of
+that.
+- <CoordinateActuator name="knee_limit"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
++ <CoordinateActuator name="reserve"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
+24 force-off, info, in forces: A force of a set is off. It does not act.
+  <CoordinateActuator name="reserve">
+- <appliesForce>false</appliesForce>
+  <coordinate>knee_angle</coordinate> </CoordinateActuator>
+25 controller-off, info, in forward: A controller of a tool is off. What it would drive has no control.
+  <ControllerSet name="controllers"> <objects>
+- <ControlSetController name="controls"> <enabled>false</enabled> </ControlSetController>
+  </objects> </ControllerSet>
+"""
+
+
+@rule("OSIM852", "tool-setting", severity=ERROR, about="document", faults=_FAULTS, frames=FRAMES)
 def tool_setting(setup: Setup, found: Found) -> None:
     """A tool has a setting with which it cannot work.
 
     Looks at accuracies and tolerances, steps, analyses, forces that are left out or replaced, and what is off.
 
     Some make OpenSim crash or run for ever, some give other results without a word.
-
-    01 pose-accuracy, warning, in ik: The accuracy of inverse kinematics is above 0.01, or 0. Poses are hardly fitted,
-    or the search does not end.
-    - <accuracy>0.5</accuracy>
-    + <accuracy>1e-5</accuracy>
-    02 few-integrator-steps, warning, in forward: A tool may take less than 10 steps. The run ends before its time.
-    - <maximum_number_of_integrator_steps>5</maximum_number_of_integrator_steps>
-    + <maximum_number_of_integrator_steps>5000</maximum_number_of_integrator_steps>
-    03 step-interval, warning, in kinematics: A step interval is below 1. It says after how many steps there is a row.
-    - <step_interval>0</step_interval>
-    + <step_interval>1</step_interval>
-    04 unnamed-point, warning, in point: The kinematics of a point are asked for without a name of it. The files of the
-    results are called by that name.
-    - <point_name></point_name>
-    + <point_name>heel</point_name>
-    05 without-model-forces, error, in optimization: The forces of the model are to be left out. OpenSim crashes.
-    - <use_model_force_set>false</use_model_force_set>
-    + <use_model_force_set>true</use_model_force_set>
-    06 activation-exponent, warning, in optimization: The exponent of activations is 1 or less. Their sum is then no
-    measure that has one smallest value.
-    - <activation_exponent>1</activation_exponent>
-    + <activation_exponent>2</activation_exponent>
-    07 few-optimizer-iterations, warning, in optimization: The optimizer has under 10 iterations. It stops too early.
-    - <optimizer_max_iterations>5</optimizer_max_iterations>
-    + <optimizer_max_iterations>100</optimizer_max_iterations>
-    08 loose-optimizer-convergence, warning, in optimization: The optimizer may stop far from its goal. With a criterion
-    above 0.05 activations stay as they come.
-    - <optimizer_convergence_criterion>0.5</optimizer_convergence_criterion>
-    + <optimizer_convergence_criterion>1e-4</optimizer_convergence_criterion>
-    09 integrator-error-tolerance, error, in forward: The error tolerance of the integrator is not positive. It is never
-    met, and OpenSim runs for ever.
-    - <integrator_error_tolerance>0</integrator_error_tolerance>
-    + <integrator_error_tolerance>1e-5</integrator_error_tolerance>
-    10 no-residual-forces, error, in rra: Residual reduction is given no forces. It controls what force_set_files
-    have, and fails without them.
-      <replace_force_set>true</replace_force_set>
-    + <force_set_files>residuals.xml</force_set_files>
-    11 replaced-forces, warning, in analyze: The forces of the model are replaced. Its muscles are gone, and what is
-    computed is that of another model.
-    - <replace_force_set>true</replace_force_set>
-    + <replace_force_set>false</replace_force_set>
-      <AnalysisSet name="analyses"> <objects> <Kinematics name="kinematics"/> </objects> </AnalysisSet>
-    12 muscles-left-in-model, error, in rra: Residual reduction leaves the muscles in the model. OpenSim crashes.
-      <force_set_files>residuals.xml</force_set_files>
-    - <replace_force_set>false</replace_force_set>
-    + <replace_force_set>true</replace_force_set>
-    13 no-adjusted-body, error, in rra: A center of mass is to be moved, of no body. OpenSim refuses the setup.
-      <force_set_files>residuals.xml</force_set_files> <replace_force_set>true</replace_force_set>
-      <adjust_com_to_reduce_residuals>true</adjust_com_to_reduce_residuals>
-      <output_model_file>adjusted.osim</output_model_file>
-    + <adjusted_com_body>thigh</adjusted_com_body>
-    14 no-analysis, error, in analyze: An analyze tool has no analysis. OpenSim refuses it.
-    + <AnalysisSet name="analyses"> <objects> <Kinematics name="kinematics"/> </objects> </AnalysisSet>
-    15 analysis-off, info, in kinematics: An analysis is off. It writes nothing.
-    - <on>false</on>
-    16 analyses-of-one-name, warning, in analyses: Two analyses have one name. They write to the same files.
-    - <Kinematics name="run"/> <Kinematics name="run"/>
-    + <Kinematics name="run"/> <Kinematics name="again"/>
-    17 unactuated-root, warning, in analyses: No actuator moves the coordinates between the model and ground. Static
-    optimization fails without residual actuators.
-    - <StaticOptimization name="optimization"/>
-    + <Kinematics name="kinematics"/>
-    18 nothing-analyzed, warning, in kinematics: An analysis names no body or coordinate. Nothing is written.
-    - <coordinates></coordinates>
-    + <coordinates>all</coordinates>
-    19 fibers-not-in-equilibrium, warning, in analyze: Muscles are analyzed at coordinates without equilibrium. Fibers
-    stay at their default lengths, of which the coordinates tell nothing.
-      <AnalysisSet name="analyses"> <objects> <MuscleAnalysis name="muscles"/> </objects> </AnalysisSet>
-    - <solve_for_equilibrium_for_auxiliary_states>false</solve_for_equilibrium_for_auxiliary_states>
-    + <solve_for_equilibrium_for_auxiliary_states>true</solve_for_equilibrium_for_auxiliary_states>
-    20 no-moment-arm-coordinate, error, in muscles: A muscle analysis names no coordinate for moment arms.
-    OpenSim fails.
-    - <moment_arm_coordinate_list></moment_arm_coordinate_list>
-    + <moment_arm_coordinate_list>all</moment_arm_coordinate_list>
-    21 reaction-on-neither, error, mends unsafe, in reaction: A joint reaction is asked for on neither child nor parent.
-    OpenSim knows these two words only, and refuses others.
-    - <apply_on_bodies>childs</apply_on_bodies>
-    + <apply_on_bodies>child</apply_on_bodies>
-    22 reaction-count, error, in reaction: Joints and the bodies that their reactions act on differ in number. OpenSim
-    takes none, one for all, or one for each, and refuses else.
-    - <apply_on_bodies>child parent child</apply_on_bodies>
-    + <apply_on_bodies>child parent</apply_on_bodies>
-    23 force-of-one-name, warning, in forces: A force that a tool adds is called as one of the model. It takes the place
-    of that.
-    - <CoordinateActuator name="knee_limit"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
-    + <CoordinateActuator name="reserve"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
-    24 force-off, info, in forces: A force of a set is off. It does not act.
-      <CoordinateActuator name="reserve">
-    - <appliesForce>false</appliesForce>
-      <coordinate>knee_angle</coordinate> </CoordinateActuator>
-    25 controller-off, info, in forward: A controller of a tool is off. What it would drive has no control.
-      <ControllerSet name="controllers"> <objects>
-    - <ControlSetController name="controls"> <enabled>false</enabled> </ControlSetController>
-      </objects> </ControllerSet>
     """
     for fault, of_class, tag, is_wrong, told in _SETTINGS:
         for item in setup.named(of_class):

@@ -293,7 +293,50 @@ _FRAMES = {
 }
 
 
-@rule("OSIM804", "column-label", severity=ERROR, about="table", frames=_FRAMES)
+_FAULTS = """\
+01 frame-and-time-label, error, mends safe, in markers: The columns of frame and time are called otherwise. OpenSim
+refuses the file.
+- Frame#→Times→asis→→→knee
++ Frame#→Time→asis→→→knee
+02 marker-label, error, in markers: A marker has no label, or one with a blank. Without one OpenSim refuses the file,
+with a blank it is the name of no marker of a model.
+- Frame#→Time→l asis→→→knee
++ Frame#→Time→asis→→→knee
+03 no-labels, error, in header: A table ends before its labels. OpenSim refuses the file.
+  endheader
++ time→hip→knee
++ 0.0→0.5→0.1
++ 0.1→0.6→0.1
+04 commas-between-labels, error, in start: Commas separate the columns of a storage file. OpenSim knows tabs and blanks
+only, and refuses it.
+- nColumns=1
++ nColumns=3
+  endheader
+- time,hip,knee
+- 0.0,0.5,0.1
+- 0.1,0.6,0.1
++ time→hip→knee
++ 0.0→0.5→0.1
++ 0.1→0.6→0.1
+05 no-time-column, error, mends safe, in old: The first column of a storage file is not called time. OpenSim refuses the
+table.
+- Time→hip→knee
++ time→hip→knee
+06 time-not-first, error, in old: The time is not in the first column. OpenSim takes what stands there for the time.
+- hip→time→knee
++ time→hip→knee
+07 blanks-between-labels, warning, in newer: Blanks separate the labels of a table of version 2 or 3. Newer tools of
+OpenSim's refuse it.
+- time hip knee
++ time→hip→knee
+08 label-twice, warning, in old: Two columns have one label. By its name OpenSim finds the first one only; of markers it
+refuses the file.
+- time→knee→knee
++ time→hip→knee
+"""
+
+
+@rule("OSIM804", "column-label", severity=ERROR, about="table", faults=_FAULTS, frames=_FRAMES)
 def column_label(table: Table, found: Found) -> None:
     """A label of a table is missing, stands there twice, or is not as OpenSim needs it.
 
@@ -304,46 +347,6 @@ def column_label(table: Table, found: Found) -> None:
     Without a column `time` OpenSim refuses the table. Of two columns with one label it finds the first (a warning), and
     takes no loads from them; of two markers with one name it refuses the file. A blank makes two labels of one, so that
     all that follow name the wrong columns.
-
-    01 frame-and-time-label, error, mends safe, in markers: The columns of frame and time are called otherwise. OpenSim
-    refuses the file.
-    - Frame#→Times→asis→→→knee
-    + Frame#→Time→asis→→→knee
-    02 marker-label, error, in markers: A marker has no label, or one with a blank. Without one OpenSim refuses the
-    file, with a blank it is the name of no marker of a model.
-    - Frame#→Time→l asis→→→knee
-    + Frame#→Time→asis→→→knee
-    03 no-labels, error, in header: A table ends before its labels. OpenSim refuses the file.
-      endheader
-    + time→hip→knee
-    + 0.0→0.5→0.1
-    + 0.1→0.6→0.1
-    04 commas-between-labels, error, in start: Commas separate the columns of a storage file. OpenSim knows tabs and
-    blanks only, and refuses it.
-    - nColumns=1
-    + nColumns=3
-      endheader
-    - time,hip,knee
-    - 0.0,0.5,0.1
-    - 0.1,0.6,0.1
-    + time→hip→knee
-    + 0.0→0.5→0.1
-    + 0.1→0.6→0.1
-    05 no-time-column, error, mends safe, in old: The first column of a storage file is not called time. OpenSim refuses
-    the table.
-    - Time→hip→knee
-    + time→hip→knee
-    06 time-not-first, error, in old: The time is not in the first column. OpenSim takes what stands there for the time.
-    - hip→time→knee
-    + time→hip→knee
-    07 blanks-between-labels, warning, in newer: Blanks separate the labels of a table of version 2 or 3. Newer tools of
-    OpenSim's refuse it.
-    - time hip knee
-    + time→hip→knee
-    08 label-twice, warning, in old: Two columns have one label. By its name OpenSim finds the first one only; of
-    markers it refuses the file.
-    - time→knee→knee
-    + time→hip→knee
     """
     labels, header = table.labels, table.header
     if isinstance(header, MarkerHeader):
