@@ -2,8 +2,8 @@
 
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
 ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``inverse_kinematics``,
-``FrameSolver``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``). Names are
-imported when first used, so that importing osimlite costs nothing.
+``FrameSolver``, ``scale``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``).
+Names are imported when first used, so that importing osimlite costs nothing.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from osimlite.errors import OsimliteError as OsimliteError
     from osimlite.fitting.frame_solver import FrameSolver as FrameSolver
     from osimlite.fitting.inverse_kinematics import inverse_kinematics as inverse_kinematics
+    from osimlite.fitting.scale_tool import scale as scale
     from osimlite.lint import validate as validate
     from osimlite.multibody import build_mechanism as mechanism
     from osimlite.schema.model import Model as Model
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
         "read",
         "read_document",
         "read_text",
+        "scale",
         "simulate",
         "to_mjcf",
         "to_text",
@@ -63,6 +65,7 @@ _FUNCTIONS = {
     "validate": "osimlite.lint",
     "FrameSolver": "osimlite.fitting.frame_solver",
     "inverse_kinematics": "osimlite.fitting.inverse_kinematics",
+    "scale": "osimlite.fitting.scale_tool",
     "mechanism": "osimlite.multibody:build_mechanism",
     "to_mjcf": "osimlite.translate",
     "to_urdf": "osimlite.translate",

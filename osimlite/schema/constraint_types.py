@@ -31,6 +31,8 @@ class ConstantDistanceConstraint(Constraint):
 class CoordinateCouplerConstraint(Constraint):
     """Makes one coordinate a function of others: dependent = `scale_factor` f(independent ones)."""
 
+    facts = Facts(scales={"scale_factor": "dependent_coordinate_name"})
+
     coupled_coordinates_function: Optional[Function] = None
     """Function of the independent coordinates; its first two derivatives are used also."""
     independent_coordinate_names: CoordinateNames = ()

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from osimlite.schema.base import Object, made
+from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Single, Unnamed, Vec3, vec3
 from osimlite.schema.functions import Constant, Function, LinearFunction
 from osimlite.schema.joints import Joint
@@ -57,6 +58,8 @@ class SpatialTransform(Object):
 
 class CustomJoint(Joint):
     """Any motion of up to six degrees of freedom; `spatial_transform` says how the coordinates make it."""
+
+    facts = Facts(scales={"spatial_transform": "socket_parent_frame"})
 
     spatial_transform: Unnamed[SpatialTransform] = made(SpatialTransform)
     """How the coordinates make the rotations and translations of the joint."""

@@ -20,6 +20,9 @@ BELOW_QUARTER_TURN: Final = "0 to 1.5707963267948866"
 """In radians: a little less than a quarter turn, as OpenSim asks."""
 UP_TO_QUARTER_TURN: Final = "0 to 1.5707963267948966"
 
+OWN, HOLDER, PATH = "own", "holder", "path"
+MEAN, ALONG, ACROSS, AXES = "mean", "along", "across", "axes"
+
 Contradiction = tuple[str | None, str]
 """The property of an object that is best changed, None if it is not one alone, and what is wrong."""
 
@@ -45,6 +48,11 @@ class Facts(NamedTuple):
         doubts: by property, what is doubtful about a number outside its domain that OpenSim computes with.
         mujoco: of a muscle, the properties that numbers of MuJoCo's muscle are read from, by MuJoCo's names (vmax,
             fvmax); a dot leads into the object that a property holds. What is not named here its base has.
+        scales: by property, what it is multiplied by when the model is scaled: by the factors of a body along its axes,
+            of which the word says whose they are (OWN the frame itself, HOLDER the frame that holds the object, or the
+            socket that leads to a frame, or the coordinate of whose joint it is the parent frame), and a word behind it
+            which one (x, y, z; MEAN; ALONG and ACROSS the Z axis of a surface, AXES of its three); or by how much
+            longer the path has become (PATH), or by nothing. What is not named here its base has.
     """
 
     states: str = ""
@@ -56,3 +64,4 @@ class Facts(NamedTuple):
     missing: Mapping[str, str] = _NONE
     doubts: Mapping[str, str] = _NONE
     mujoco: Mapping[str, str] = _NONE
+    scales: Mapping[str, str] = _NONE

@@ -4,7 +4,7 @@ import math
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, made, none
-from osimlite.schema.facts import Facts
+from osimlite.schema.facts import OWN, Facts
 from osimlite.schema.fields import LegacyMany, Many, Single, Unnamed, Value, Vec3, Vec6, real, vec3, word
 from osimlite.schema.geometry import FrameGeometry, Geometry
 from osimlite.schema.references import PhysicalFrameSocket, StationSocket
@@ -17,7 +17,8 @@ class Frame(ModelComponent, abstract=True):
 
     facts = Facts(
         outputs="acceleration:SpatialVec angular_acceleration:Vec3 angular_velocity:Vec3 linear_acceleration:Vec3 "
-        "linear_velocity:Vec3 position:Vec3 rotation:Rotation transform:Transform velocity:SpatialVec"
+        "linear_velocity:Vec3 position:Vec3 rotation:Rotation transform:Transform velocity:SpatialVec",
+        scales={"attached_geometry": OWN},
     )
 
     frame_geometry: Single[FrameGeometry] = made(FrameGeometry, name="frame_geometry")
@@ -52,6 +53,7 @@ class Body(PhysicalFrame):
         "linear_momentum_about_mass_center:Vec3 linear_momentum_about_origin:Vec3 "
         "momentum_about_mass_center:SpatialVec momentum_about_origin:SpatialVec",
         refused="mass",
+        scales={"mass_center": OWN},
     )
 
     mass: Annotated[float, real("kg", ">= 0")] = math.nan
@@ -64,6 +66,8 @@ class Body(PhysicalFrame):
 
 class PhysicalOffsetFrame(PhysicalFrame):
     """A frame fixed in another physical frame, displaced by `translation` and turned by `orientation`."""
+
+    facts = Facts(scales={"translation": "socket_parent"})
 
     socket_parent: PhysicalFrameSocket = ""
     """The frame that this one is fixed in."""

@@ -157,7 +157,9 @@ class FreeJoint(Joint):
 class EllipsoidJoint(Joint):
     """The child's origin stays on an ellipsoid about the parent's; rotations as a GimbalJoint, Z along the normal."""
 
-    facts = Facts(missing={NAN: "radii_x_y_z"}, doubts={"radii_x_y_z": FLAT})
+    facts = Facts(
+        missing={NAN: "radii_x_y_z"}, doubts={"radii_x_y_z": FLAT}, scales={"radii_x_y_z": "socket_parent_frame"}
+    )
 
     motion_types = ("rotational", "rotational", "rotational")
     speeds_are_rates = False
@@ -172,7 +174,14 @@ class EllipsoidJoint(Joint):
 class ScapulothoracicJoint(Joint):
     """A shoulder blade that glides on an ellipsoid: abduction, elevation, upward rotation, winging."""
 
-    facts = Facts(missing={NAN: "thoracic_ellipsoid_radii_x_y_z"}, doubts={"thoracic_ellipsoid_radii_x_y_z": FLAT})
+    facts = Facts(
+        missing={NAN: "thoracic_ellipsoid_radii_x_y_z"},
+        doubts={"thoracic_ellipsoid_radii_x_y_z": FLAT},
+        scales={
+            "thoracic_ellipsoid_radii_x_y_z": "socket_parent_frame",
+            "scapula_winging_axis_origin": "socket_child_frame",
+        },
+    )
 
     motion_types = ("rotational", "rotational", "rotational", "rotational")
     speeds_are_rates = False
@@ -189,6 +198,7 @@ class ScapulothoracicJoint(Joint):
 class ConstantCurvatureJoint(Joint):
     """A rod of fixed length that bends evenly, such as a spine; bends about X and Z, then twist about Y."""
 
+    facts = Facts(scales={"length": "socket_child_frame y"})
     motion_types = ("rotational", "rotational", "rotational")
 
     coordinates: Many[Coordinate] = _coordinates(3)

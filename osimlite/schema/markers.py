@@ -16,7 +16,7 @@ class Point(ModelComponent, abstract=True):
 class Station(Point):
     """A point fixed in a physical frame, `location` given in that frame."""
 
-    facts = Facts(outputs="acceleration:Vec3 location:Vec3 velocity:Vec3")
+    facts = Facts(outputs="acceleration:Vec3 location:Vec3 velocity:Vec3", scales={"location": "socket_parent_frame"})
 
     socket_parent_frame: PhysicalFrameSocket = ""
     """The frame that the point is fixed in."""

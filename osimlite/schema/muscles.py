@@ -16,6 +16,7 @@ from osimlite.schema.facts import (
     BELOW_QUARTER_TURN,
     NAN,
     NO_EQUILIBRIUM,
+    PATH,
     STUCK,
     UP_TO_QUARTER_TURN,
     Contradiction,
@@ -56,6 +57,7 @@ class Muscle(PathActuator, abstract=True):
             "vmax": "max_contraction_velocity",
             "fvmax": "force_velocity_curve.max_eccentric_velocity_force_multiplier",
         },
+        scales={"optimal_fiber_length": PATH, "tendon_slack_length": PATH},
     )
 
     min_control: Number = 0.0
@@ -357,7 +359,10 @@ class MeyerFregly2016Muscle(Muscle):
 class RigidTendonMuscle(Muscle):
     """A muscle whose tendon keeps its slack length, with splines as curves."""
 
-    facts = Facts(zero={NAN: "optimal_fiber_length max_contraction_velocity"})
+    facts = Facts(
+        zero={NAN: "optimal_fiber_length max_contraction_velocity"},
+        scales={"optimal_fiber_length": "", "tendon_slack_length": ""},
+    )
 
     active_force_length_curve: Single[Function] = Field(
         default_factory=partial(active_force_length, "active_force_length_curve")

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from osimlite.schema.base import made
 from osimlite.schema.default_curves import passive_force_length
-from osimlite.schema.facts import NAN, Facts
+from osimlite.schema.facts import NAN, PATH, Facts
 from osimlite.schema.fields import Flag, Single, Tag, Text, real
 from osimlite.schema.forces import ForceProducer
 from osimlite.schema.functions import Function
@@ -23,7 +23,11 @@ def _green() -> Appearance:
 class PathSpring(ForceProducer):
     """A spring along a path that pulls and never pushes; damping grows with its tension."""
 
-    facts = Facts(outputs="length lengthening_speed stretch tension", refused="resting_length stiffness dissipation")
+    facts = Facts(
+        outputs="length lengthening_speed stretch tension",
+        refused="resting_length stiffness dissipation",
+        scales={"resting_length": PATH},
+    )
 
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
         GeometryPath, name="path", appearance=_green
@@ -40,7 +44,7 @@ class PathSpring(ForceProducer):
 class ExpressionBasedPathForce(ForceProducer):
     """A tension by a formula in the path's stretch `s` and its lengthening speed `ldot`."""
 
-    facts = Facts(outputs="length lengthening_speed stretch tension")
+    facts = Facts(outputs="length lengthening_speed stretch tension", scales={"resting_length": PATH})
 
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
         GeometryPath, name="path", appearance=_green
@@ -57,7 +61,7 @@ class ExpressionBasedPathForce(ForceProducer):
 class Ligament(ForceProducer):
     """A ligament: `pcsa_force` times a curve of its length over `resting_length`."""
 
-    facts = Facts(domains={"resting_length": "> 0"}, zero={NAN: "resting_length"})
+    facts = Facts(domains={"resting_length": "> 0"}, zero={NAN: "resting_length"}, scales={"resting_length": PATH})
 
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(GeometryPath, name="path")
     """The line along which the ligament pulls."""
@@ -72,7 +76,10 @@ class Ligament(ForceProducer):
 class Blankevoort1991Ligament(ForceProducer):
     """A ligament whose force rises as the square of strain, and linearly beyond `transition_strain`."""
 
-    facts = Facts(outputs="damping_force length lengthening_speed spring_force strain strain_rate total_force")
+    facts = Facts(
+        outputs="damping_force length lengthening_speed spring_force strain strain_rate total_force",
+        scales={"slack_length": PATH},
+    )
 
     geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(GeometryPath, name="path")
     """The line along which the ligament pulls."""

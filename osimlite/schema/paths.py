@@ -31,7 +31,7 @@ class AbstractPathPoint(Point, abstract=True):
 class PathPoint(AbstractPathPoint):
     """A point fixed in a frame."""
 
-    facts = Facts(outputs="acceleration:Vec3 location:Vec3 velocity:Vec3")
+    facts = Facts(outputs="acceleration:Vec3 location:Vec3 velocity:Vec3", scales={"location": "socket_parent_frame"})
 
     internal = (("station", Station),)
 
@@ -51,7 +51,10 @@ class ConditionalPathPoint(PathPoint):
 class MovingPathPoint(AbstractPathPoint):
     """A point whose place in its frame follows a coordinate; the three sockets must name the same one."""
 
-    facts = Facts(outputs="acceleration:Vec3 location:Vec3 velocity:Vec3")
+    facts = Facts(
+        outputs="acceleration:Vec3 location:Vec3 velocity:Vec3",
+        scales={f"{axis}_location": f"socket_parent_frame {axis}" for axis in "xyz"},
+    )
 
     socket_x_coordinate: CoordinateSocket = ""
     """The argument of `x_location`."""

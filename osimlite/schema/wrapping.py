@@ -5,7 +5,7 @@ from math import inf
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, made, none
-from osimlite.schema.facts import Contradiction, Facts
+from osimlite.schema.facts import ACROSS, ALONG, AXES, HOLDER, MEAN, Contradiction, Facts
 from osimlite.schema.fields import Flag, LegacyMany, Unnamed, Vec3, real, vec3, word
 from osimlite.schema.geometry import Appearance
 from osimlite.schema.sets import ModelComponentSet
@@ -13,6 +13,8 @@ from osimlite.schema.sets import ModelComponentSet
 
 class WrapObject(ModelComponent, abstract=True):
     """A surface fixed in the frame that owns it, for paths to wrap around."""
+
+    facts = Facts(scales={"translation": HOLDER})
 
     active: Flag = True
     """Whether paths wrap around the surface."""
@@ -31,7 +33,11 @@ class WrapObject(ModelComponent, abstract=True):
 class WrapCylinder(WrapObject):
     """A cylinder along its own Z axis."""
 
-    facts = Facts(refused="radius length", zero={"": "radius length"})
+    facts = Facts(
+        refused="radius length",
+        zero={"": "radius length"},
+        scales={"radius": f"{HOLDER} {ACROSS}", "length": f"{HOLDER} {ALONG}"},
+    )
 
     radius: Annotated[float, real("m", "> 0")] = 1.0
     """Distance of the surface from the Z axis."""
@@ -42,7 +48,7 @@ class WrapCylinder(WrapObject):
 class WrapEllipsoid(WrapObject):
     """An ellipsoid with half axes `dimensions`."""
 
-    facts = Facts(refused="dimensions")
+    facts = Facts(refused="dimensions", scales={"dimensions": f"{HOLDER} {AXES}"})
 
     dimensions: Annotated[Vec3, vec3("m", "> 0")] = (0.05, 0.05, 0.05)
     """Half axes along X, Y and Z of the surface."""
@@ -51,7 +57,7 @@ class WrapEllipsoid(WrapObject):
 class WrapSphere(WrapObject):
     """A ball."""
 
-    facts = Facts(refused="radius", zero={"": "radius"})
+    facts = Facts(refused="radius", zero={"": "radius"}, scales={"radius": f"{HOLDER} {MEAN}"})
 
     radius: Annotated[float, real("m", "> 0")] = 0.05
     """Distance of the surface from the middle."""
@@ -60,7 +66,10 @@ class WrapSphere(WrapObject):
 class WrapTorus(WrapObject):
     """A ring about its own Z axis; paths run through its hole."""
 
-    facts = Facts(refused="inner_radius outer_radius")
+    facts = Facts(
+        refused="inner_radius outer_radius",
+        scales=dict.fromkeys(("inner_radius", "outer_radius"), f"{HOLDER} {ACROSS}"),
+    )
 
     inner_radius: Annotated[float, real("m", "> 0")] = 0.01
     """Radius of the tube itself; must be less than the outer one."""

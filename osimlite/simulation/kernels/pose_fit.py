@@ -52,6 +52,8 @@ LIGHTEST, HEAVIEST, FIRST_DAMPING = 1e-10, 1e12, 1e-4
 VAGUE, ALIKE = 1e-7, 1e-7
 """Least damping where there are poses that look alike; what part of its stiffness a coordinate must keep when all
 others follow, so that this is not so."""
+SMALL_STEPS = 1e-2
+"""Damping of the first step where the way down is to be followed closely."""
 POSES = 2
 """How many poses are kept to go on from."""
 INWARDS = 0.3
@@ -128,12 +130,19 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
             copy(size, y, trial)
         value = other if not value < other else cost(m, trial)
     lightest, start = VAGUE if is_vague else LIGHTEST, at(history, 2 + POSES * size)
+    if kept == 0:
+        copy(size, trial, last)
     copy(size, trial, start)
     value, steps, status = descend(m, trial, y, value, lightest, lightest)
     if kept == 0:
-        # From far away there are several ways down; small steps find others than large ones.
+        # From far away there are several ways down; small steps find others than large ones, and what begins away from
+        # the ends of its range is not held there before it is known where it belongs.
         value, more, status = descend_again(m, start, y, value, status, FIRST_DAMPING, lightest)
         steps += more
+        for inwards in range(2):
+            move_inwards(m, last, start, 2.0 * INWARDS * (1 + inwards))
+            value, more, status = descend_again(m, start, y, value, status, SMALL_STEPS, lightest)
+            steps += more
     if leave_ends(m, y, start):
         value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
         steps += more
@@ -184,6 +193,16 @@ def descend_again(
         return new, steps, found
     copy(size, best, y)
     return value, steps, status
+
+
+def move_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> None:
+    """A pose in which no clamped coordinate is near an end of its range."""
+    ranges = at(m.c, m.p[RANGES_AT])
+    for k in range(m.s[FREEDOMS]):
+        low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], from_pose[k]
+        if low < high:
+            inner = min(inwards, 0.5 * (high - low))
+            start[k] = min(max(start[k], low + inner), high - inner)
 
 
 def leave_ends(m: Fit, y: Floats, start: Floats) -> bool:

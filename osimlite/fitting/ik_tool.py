@@ -1,0 +1,140 @@
+"""OpenSim's InverseKinematicsTool: tasks become weights and goals, results its files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from osimlite.errors import SettingError
+from osimlite.fitting.inverse_kinematics import FittedMotion, fitted, marker_stations
+from osimlite.fitting.marker_data import MarkerData, common
+from osimlite.fitting.pose_layout import Goal
+from osimlite.multibody import build_mechanism
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.smoothing_spline import smoothing_spline
+from osimlite.multibody.spatial import Array
+from osimlite.schema.model import Model
+from osimlite.schema.tools.inverse_kinematics import (
+    IKCoordinateTask,
+    IKMarkerTask,
+    IKTask,
+    InverseKinematicsTool,
+)
+from osimlite.simulation.files.old_storage import NOTES, old_storage_text
+from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.text import did_you_mean
+
+UNNAMED = ("", "Unassigned")
+"""What stands for no file."""
+
+
+class Tasks(NamedTuple):
+    """What inverse kinematics is asked for.
+
+    Attributes:
+        weights: of the markers that are fitted or reported, in the order of the data.
+        goals: coordinates that are to have values.
+        wanted: these values (t, k), rad or m.
+    """
+
+    weights: dict[str, float]
+    goals: list[Goal]
+    wanted: Array
+
+
+def tasks_of(
+    model: Model, mechanism: Mechanism, tasks: Iterable[IKTask], data: MarkerData, coordinates: StoTable | None
+) -> Tasks:
+    """What a set of tasks asks for of a model and data.
+
+    Without a marker task that applies, all markers weigh 1. Values from a file are taken in degrees, whatever it says,
+    and from splines of fifth degree, as in OpenSim.
+
+    Raises:
+        SettingError: a coordinate is not there, has no value in the file, or a weight is none.
+        OsimliteError: no marker of the tasks is in the model and in the data.
+    """
+    applied = [task for task in tasks if task.apply]
+    for task in applied:
+        if not 0.0 <= task.weight < np.inf:
+            raise SettingError(f"the weight {task.weight:g} of the task '{task.name}' is no weight; give one from 0 on")
+    asked = {task.name: float(task.weight) for task in applied if isinstance(task, IKMarkerTask)} or None
+    names = common([*marker_stations(model, mechanism)], data, asked)
+    weights = {name: 1.0 if asked is None else asked[name] for name in names}
+    goals, wanted = [], []
+    for task in applied:
+        if isinstance(task, IKCoordinateTask):
+            place = mechanism.coordinate_index(task.name)
+            goals.append(Goal(place, float(task.weight)))
+            wanted.append(_values(task, mechanism, place, data.times, coordinates))
+    return Tasks(weights, goals, np.array(wanted).reshape(len(goals), len(data.times)).T)
+
+
+def _values(
+    task: IKCoordinateTask, mechanism: Mechanism, place: int, times: Array, coordinates: StoTable | None
+) -> Array:
+    """The values of a coordinate task over time, rad or m."""
+    info = mechanism.coordinates[place]
+    if task.value_type == "manual_value":
+        return np.full(len(times), float(task.value))
+    if task.value_type != "from_file":
+        return np.full(len(times), info.default_value)
+    columns = () if coordinates is None else coordinates.columns
+    if coordinates is None or task.name not in columns:
+        where = "there is no coordinate_file" if coordinates is None else f"'{coordinates.file}' has no such column"
+        raise SettingError(
+            f"the value of '{task.name}' is to be from a file, and {where}{did_you_mean(task.name, columns)}"
+        )
+    values = np.deg2rad(coordinates[task.name]) if info.motion_type == "rotational" else coordinates[task.name]
+    half = min(3, (len(values) + 1) // 2)
+    if len(values) < 2:
+        return np.full(len(times), float(values[0]))
+    spline = smoothing_spline(coordinates.times, values, half, 0.0)
+    return np.array([spline.derivatives(t)[0] for t in times.tolist()])
+
+
+def run_inverse_kinematics(
+    tool: InverseKinematicsTool, model: Model, data: MarkerData, coordinates: StoTable | None = None
+) -> FittedMotion:
+    """What the tool computes, for a model and data that are read already; errors as those of `tasks_of`."""
+    first, last = tool.time_range
+    frames = data.between(first, last)
+    mechanism = build_mechanism(model)
+    tasks = tasks_of(model, mechanism, tool.ik_task_set.objects, frames, coordinates)
+    return fitted(model, mechanism, frames, tasks.weights, tasks.goals, tasks.wanted)
+
+
+def written(tool: InverseKinematicsTool, motion: FittedMotion) -> Iterator[tuple[str, str]]:
+    """Names, from the folder of the setup file, and texts of the files that the tool writes."""
+    times = motion.times.tolist()
+    if tool.output_motion_file not in UNNAMED:
+        yield tool.output_motion_file, motion_text(motion)
+    folder = Path(tool.results_directory or ".")
+    if tool.report_errors:
+        squares = motion.marker_errors**2
+        totals = squares.sum(axis=1)
+        rows = np.column_stack([totals, np.sqrt(totals / squares.shape[1]), np.sqrt(squares.max(axis=1))])
+        labels = ("total_squared_error", "marker_error_RMS", "marker_error_max")
+        text = old_storage_text("Model Marker Errors from IK", times, labels, rows.tolist())
+        yield str(folder / f"{tool.name}_ik_marker_errors.sto"), text
+    if tool.report_marker_locations:
+        columns = [f"{name}_t{axis}" for name in motion.markers for axis in "xyz"]
+        places = motion.places.reshape(len(times), -1).tolist()
+        text = old_storage_text("Model Marker Locations from IK", times, columns, places)
+        yield str(folder / f"{tool.name}_ik_model_marker_locations.sto"), text
+
+
+def motion_text(motion: FittedMotion) -> str:
+    """The coordinates as the tool writes them, in degrees."""
+    names = [info.name for info in motion.mechanism.coordinates]
+    return old_storage_text(
+        "Coordinates", motion.times.tolist(), names, motion.in_degrees.tolist(), in_degrees=True, notes=NOTES
+    )
+
+
+def coordinate_table(name: str, folder: Path) -> StoTable | None:
+    """The coordinate file of a setup, if it names one."""
+    return None if name in UNNAMED else read_sto(folder / name)

@@ -1,0 +1,198 @@
+"""Scaling: what each class declares, masses and inertias, measurements, and OpenSim's own scaled model."""
+
+from __future__ import annotations
+
+import gzip
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.errors import ModelError, SettingError
+from osimlite.fitting.measuring import frames_between
+from osimlite.fitting.scale_tool import run_scale
+from osimlite.fitting.scaling import scale_model, scales
+from osimlite.schema.base import Object
+from osimlite.schema.facts import HOLDER, OWN, PATH
+from osimlite.schema.registry import MODULES
+from osimlite.simulation.files.storage import read_sto
+
+CASE = "oracle/tools/reference/scale_gait2354"
+
+
+def numbers_of(item: Object, path: str = "") -> dict[str, Any]:
+    """Every value of an object and of all that it holds, by where it is."""
+    found: dict[str, Any] = {f"{path}": type(item).__name__}
+    for spec in type(item).field_specs().values():
+        value = getattr(item, spec.name)
+        many = value if isinstance(value, list) else [value]
+        for number, one in enumerate(many):
+            if isinstance(one, Object):
+                found |= numbers_of(one, f"{path}/{spec.name}[{number}]")
+            else:
+                found[f"{path}/{spec.name}"] = one
+    return found
+
+
+def assert_same(ours: Object, theirs: Object, but: str = "/socket_frame") -> None:
+    """Objects mean the same; numbers agree to 1e-9."""
+    left_out = "/socket_frame", but
+    one, other = ({k: v for k, v in numbers_of(item).items() if not k.endswith(left_out)} for item in (ours, theirs))
+    assert one.keys() == other.keys()
+    for place, value in other.items():
+        if isinstance(value, float) or (isinstance(value, tuple) and value and isinstance(value[0], float)):
+            # Of the points of a spline OpenSim prints six digits.
+            rel = 1e-5 if place.endswith(("/x", "/y")) else 1e-9
+            assert np.asarray(one[place]) == pytest.approx(np.asarray(value), rel=rel, abs=1e-12, nan_ok=True), place
+        else:
+            assert one[place] == value, place
+
+
+def test_every_rule_is_about_a_property_that_is_there() -> None:
+    """And about a frame, a socket, or a path."""
+    count = 0
+    for name, module in MODULES.items():
+        cls = getattr(import_module(module), name)
+        for property_name, rule in scales(cls).items():
+            whose = rule.split()[0]
+            assert property_name in cls.model_fields, name
+            assert whose in (OWN, HOLDER, PATH) or whose in cls.model_fields, name
+            count += 1
+    assert count > 50
+
+
+@pytest.fixture
+def setup(shared: Path, tmp_path: Path) -> Path:
+    """The setup of a gait model beside the files that it names."""
+    for source in (shared / CASE).iterdir():
+        data = source.read_bytes()
+        name = source.name.removesuffix(".gz")
+        (tmp_path / f"their_{name}").write_bytes(gzip.decompress(data) if source.suffix == ".gz" else data)
+    tool: Any = osimlite.read_document(tmp_path / "their_scale.xml")
+    names = {
+        "gait2354.osim": tool.generic_model_maker.model_file,
+        "markers.xml": tool.generic_model_maker.marker_set_file,
+        "static.trc": tool.model_scaler.marker_file,
+    }
+    for theirs, name in names.items():
+        (tmp_path / name).write_bytes((tmp_path / f"their_{theirs}").read_bytes())
+    return tmp_path
+
+
+def test_a_gait_model_is_scaled_as_opensim_scales_it(setup: Path) -> None:
+    """Model and factors by meaning, and a pose of the subject that is no worse than OpenSim's."""
+    tool: Any = osimlite.read_document(setup / "their_scale.xml")
+    found = run_scale(tool, setup)
+    ours = osimlite.read_text(found.texts[tool.model_scaler.output_model_file])
+    assert_same(ours, osimlite.read(setup / "their_subject01_scaledOnly.osim"))
+    theirs: Any = osimlite.read_document(setup / "their_subject01_scaleSet_applied.xml")
+    assert found.measured is not None and found.placed is not None
+    for scale in theirs.objects:
+        # OpenSim prints six digits of these.
+        assert found.measured.factors[scale.segment] == pytest.approx(scale.scales, rel=1e-5)
+    assert found.measured.notes[0] == "measurement 'thigh': the model has no body 'patella_r'"
+    placed = osimlite.read_text(found.texts[tool.marker_placer.output_model_file])
+    assert_same(placed, osimlite.read(setup / "their_subject01_simbody.osim"), but="location")
+    text = found.texts[tool.marker_placer.output_motion_file]
+    their_text = (setup / "their_subject01_static_output.mot").read_text()
+    assert text.split("\n")[:7] == their_text.split("\n")[:7]
+    assert found.placed.pose.costs[0] == pytest.approx(2.0127e-4, rel=3e-3) and not found.placed.pose.unsettled
+    (setup / "pose.mot").write_text(text)
+    pose, known = read_sto(setup / "pose.mot"), read_sto(setup / "their_subject01_static_output.mot")
+    assert pose.columns == known.columns and pose.rows == pytest.approx(known.rows, abs=0.02)
+    assert len(found.placed.moved) > 30 and max(found.placed.moved.values()) < 0.2
+
+
+def body_model() -> osimlite.Model:
+    """A thigh with two markers on its ends and a shank below."""
+    model = osimlite.Model(name="leg")
+    thigh = osimlite.Body(
+        name="thigh", mass=8.0, mass_center=(0.0, -0.2, 0.0), inertia=(0.1, 0.02, 0.1, 0.01, 0.0, 0.0)
+    )
+    model.add(thigh)
+    model.add(osimlite.FreeJoint(name="hip", socket_parent_frame=model.ground, socket_child_frame=thigh))
+    for name, y in (("top", 0.0), ("bottom", -0.4)):
+        model.add(osimlite.Marker(name=name, socket_parent_frame=thigh, location=(0.0, y, 0.0)))
+    return model
+
+
+STATIC = {"top": [[0.0, 1.0, 0.0]] * 3, "bottom": [[0.0, 0.5, 0.0], [0.0, 0.52, 0.0], [0.0, 0.54, 0.0]]}
+LENGTH = {"length": ([("top", "bottom")], {"thigh": "Y"})}
+
+
+def test_distances_of_markers_scale_bodies() -> None:
+    """The mean over the frames, along the axes that are named; the model given stays as it is."""
+    model = body_model()
+    found = osimlite.scale(model, STATIC, measurements=LENGTH)
+    assert found.measured is not None and found.measured.ratios == {"length": pytest.approx(0.48 / 0.4)}
+    thigh: Any = found.model["/bodyset/thigh"]
+    assert thigh.mass_center == pytest.approx((0.0, -0.24, 0.0)) and thigh.mass == pytest.approx(8.0 * 1.2)
+    assert model["/bodyset/thigh"].mass == 8.0
+    both = osimlite.scale(model, STATIC, measurements=LENGTH, factors={"thigh": (2.0, 1.0, 1.0)}, mass=5.0)
+    assert both.model["/bodyset/thigh"].mass == pytest.approx(5.0)
+    assert both.model["/markerset/bottom"].location == pytest.approx((0.0, -0.4, 0.0))
+
+
+def test_markers_are_placed_where_they_were_measured() -> None:
+    """In the pose that fits them; fixed ones stay."""
+    model = body_model()
+    model["/markerset/top"].fixed = True
+    found = osimlite.scale(model, STATIC, measurements=LENGTH, place=True)
+    assert found.placed is not None and list(found.placed.moved) == ["bottom"]
+    state = found.placed.pose.mechanism.at(found.placed.pose.values[0])
+    bottom = np.array(found.model["/markerset/bottom"].location)
+    assert state.point(0, bottom) == pytest.approx((0.0, 0.52, 0.0), abs=1e-9)
+    assert found.model["/markerset/top"].location == (0.0, 0.0, 0.0)
+
+
+def test_inertia_of_equal_factors_is_exact() -> None:
+    """It goes by the square of the factor, and by the mass."""
+    model = body_model()
+    scale_model(model, {"thigh": (1.1, 1.1, 1.1)})
+    assert model["/bodyset/thigh"].inertia == pytest.approx(np.array((0.1, 0.02, 0.1, 0.01, 0.0, 0.0)) * 1.1**5)
+    model = body_model()
+    scale_model(model, {"thigh": (1.1, 1.1, 1.1)}, preserve_mass_distribution=True)
+    assert model["/bodyset/thigh"].inertia == pytest.approx(np.array((0.1, 0.02, 0.1, 0.01, 0.0, 0.0)) * 1.1**2)
+
+
+def test_what_cannot_be_scaled_is_told() -> None:
+    """Names that are not there, markers that are missing, ranges that are empty."""
+    model = body_model()
+    with pytest.raises(SettingError, match="no body 'tigh'; did you mean 'thigh'"):
+        osimlite.scale(model, factors={"tigh": 1.2})
+    with pytest.raises(SettingError, match="there are no markers of it"):
+        osimlite.scale(model, measurements=LENGTH)
+    notes = osimlite.scale(model, {"top": STATIC["top"]}, measurements=LENGTH).measured
+    assert notes is not None and notes.notes == ["measurement 'length' is left out: the data have no marker 'bottom'"]
+    gap = {**STATIC, "bottom": [[0.0, np.nan, 0.0], *STATIC["bottom"][1:]]}
+    notes = osimlite.scale(model, gap, measurements=LENGTH).measured
+    assert notes is not None and "were not seen in every frame" in notes.notes[0]
+    with pytest.raises(SettingError, match="before it begins"):
+        frames_between(np.arange(3.0), 2.0, 1.0)
+    slider = osimlite.Model(name="slider")
+    body = osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    slider.add(body)
+    slider.add(osimlite.PlanarJoint(name="j", socket_parent_frame=slider.ground, socket_child_frame=body))
+    names = [item.name for item in slider.components(osimlite.Coordinate)]
+    slider.add(
+        osimlite.CoordinateCouplerConstraint(
+            name="c",
+            independent_coordinate_names=(names[0],),
+            dependent_coordinate_name=names[1],
+            coupled_coordinates_function=osimlite.LinearFunction(coefficients=(1.0, 0.0)),
+        )
+    )
+    with pytest.raises(ModelError, match="give it one factor for all axes"):
+        scale_model(slider, {"ground": (1.0, 2.0, 1.0)})
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "frames"), [(-1.0, 9.0, (0, 4)), (0.5, 1.5, (0, 3)), (1.0, 2.0, (1, 3)), (7.0, 8.0, (3, 4))]
+)
+def test_frames_of_a_range_are_those_of_opensim(first: float, last: float, frames: tuple[int, int]) -> None:
+    """The last one not after the beginning to the first one not before the end."""
+    found = frames_between(np.arange(4.0), first, last)
+    assert (found.start, found.stop) == frames
