@@ -7,10 +7,12 @@ it, and loading it takes longer than most commands do.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from types import UnionType
 from typing import Any, NamedTuple, get_args, get_origin
+
+from osimlite.choices import Choice
 
 _NUMBERS = {int: re.compile(r"[0-9]+", re.ASCII), float: re.compile(r"[0-9]*\.?[0-9]+(e[-+]?[0-9]+)?", re.ASCII)}
 """Texts of numbers that mean the same to everybody."""
@@ -80,10 +82,15 @@ class _Parameter(NamedTuple):
 
 
 class Command:
-    """A function that is a command."""
+    """A function that is a command.
 
-    def __init__(self, function: Callable[..., None]) -> None:
-        self.function = function
+    Args:
+        function: whose parameters have a :class:`Declared` each.
+        more: what it takes besides, as keyword arguments.
+    """
+
+    def __init__(self, function: Callable[..., None], more: Callable[[], Iterable[Choice]] = tuple) -> None:
+        self.function, self._more = function, more
         self.__name__, self.__doc__, self.__module__ = function.__name__, function.__doc__, function.__module__
 
     def __call__(self, *values: Any, **named: Any) -> None:
@@ -98,7 +105,7 @@ class Command:
             annotation = eval(function.__annotations__[name], function.__globals__)
             kind, declared = annotation.__origin__, annotation.__metadata__[0]
             found.append(_Parameter(name, kind, declared, defaults.get(name, ...)))
-        return found
+        return found + [_Parameter(each.name, each.type, _declared(each), each.default) for each in self._more()]
 
     @property
     def __annotations__(self) -> dict[str, Any]:  # type: ignore[override]
@@ -173,5 +180,17 @@ def _names(function: Any) -> tuple[str, ...]:
     return names
 
 
-command = Command
-"""Makes a command of a function."""
+def _declared(choice: Choice) -> Declared:
+    shown: Any = choice.shown or (choice.default is not None and choice.type is not bool)
+    told = {"help": choice.help, "metavar": choice.unit, "show_default": shown, "rich_help_panel": choice.group}
+    return Option(*choice.spelled, **{word: value for word, value in told.items() if value != ""})
+
+
+def command(function: Callable[..., None]) -> Command:
+    """Make a command of a function."""
+    return Command(function)
+
+
+def command_with(more: Callable[[], Iterable[Choice]]) -> Callable[[Callable[..., None]], Command]:
+    """Make a command of a function that takes these options too, as keyword arguments."""
+    return lambda function: Command(function, more)

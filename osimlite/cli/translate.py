@@ -2,109 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from osimlite.cli import _options as options
-from osimlite.cli._command import Option, command
+from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import add_row, plain_console, plain_table, say
+from osimlite.exporters import exporters
 from osimlite.text import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from osimlite.translate.export import Urdf
+    from osimlite.choices import Choice
     from osimlite.translate.fidelity import Fidelity
-    from osimlite.translate.mjcf.export import Mjcf
 
 
-@command
+def _choices() -> Iterator[Choice]:
+    for exporter in exporters("translate").values():
+        yield from exporter.choices
+
+
+def _told() -> str:
+    return "The format: " + "; ".join(f"'{name}' writes {each.help}" for name, each in exporters("translate").items())
+
+
+@command_with(_choices)
 def translate(
     file: options.File,
-    to: Annotated[str, Option("--to", help="The format: 'urdf', or 'mjcf' for MuJoCo.")] = "urdf",
+    to: Annotated[str, Option("--to", metavar="FORMAT", help=f"{_told()}.")] = "urdf",
     output: options.Folder = None,
     geometry: options.Geometry = None,
-    limits: Annotated[
-        str | None,
-        Option(
-            help="'range' writes coordinate ranges as hard limits, which they are not in OpenSim.",
-            show_default="none",
-            rich_help_panel="URDF",
-        ),
-    ] = None,
-    merge: Annotated[
-        bool | None,
-        Option("--merge", help="Make bodies that do not move relative to each other one link.", rich_help_panel="URDF"),
-    ] = None,
-    collision: Annotated[
-        bool | None,
-        Option(
-            "--collision",
-            help="Write contact geometry as collision shapes (a half space as a large box).",
-            rich_help_panel="URDF",
-        ),
-    ] = None,
-    effort: Annotated[
-        float | None,
-        Option(
-            help="Greatest force (N, N m) of joints whose coordinate has no actuators that limit it.",
-            show_default="no limit",
-            rich_help_panel="URDF",
-        ),
-    ] = None,
-    velocity: Annotated[
-        float | None,
-        Option(help="Greatest rate (m/s, rad/s) of all joints.", show_default="no limit", rich_help_panel="URDF"),
-    ] = None,
-    mujoco: Annotated[
-        int | None, Option(help="The version to write for, 3 or 4.", show_default="4", rich_help_panel="MJCF")
-    ] = None,
-    contact: Annotated[
-        str | None,
-        Option(
-            help="'native' writes contact forces as contacts of MuJoCo's own law, 'none' leaves them out.",
-            show_default="native",
-            rich_help_panel="MJCF",
-        ),
-    ] = None,
-    fit: Annotated[
-        str | None,
-        Option(
-            help="'wraps' fits what tendons go around to the paths, 'force' muscles too (up to a minute).",
-            show_default="none",
-            rich_help_panel="MJCF",
-        ),
-    ] = None,
     check: Annotated[
         Path | None,
         Option(
             metavar="MJCF",
             help="Translate nothing, but measure this file, by whatever program, against the model (needs MuJoCo).",
             show_default=False,
-            rich_help_panel="MJCF",
         ),
     ] = None,
-    spline: Annotated[
-        str | None,
-        Option(
-            help="What joints follow that move by splines: a 'quartic', or 'series': a quartic of a quartic.",
-            show_default="series",
-            rich_help_panel="MJCF",
-        ),
-    ] = None,
-    driver: Annotated[
-        bool | None,
-        Option(
-            "--driver",
-            help="Write what osimlite.mjcf.Driver moves by OpenSim's own laws: the file itself has no forces.",
-            rich_help_panel="MJCF",
-        ),
-    ] = None,
+    **chosen: Any,
 ) -> None:
     """Translate a model: writes its text, its meshes and fidelity.json.
 
-    --to urdf writes <file>.urdf and <file>.coordinates.json, which says how
-    coordinates drive joints where URDF cannot; --to mjcf writes <file>.xml.
     Meshes in VTK's format (.vtp) become .obj, text .stl becomes binary.
     fidelity.json says what became of every component, and the table what is lost.
     --check MJCF prints lengths, moment arms and forces of its muscles beside the
@@ -114,28 +53,21 @@ def translate(
     """
     from osimlite.document.reader import read
     from osimlite.errors import OsimliteError, SettingError
-    from osimlite.translate import to_mjcf, to_urdf
 
     if check is not None:
         from osimlite.cli._checking_mjcf import check as check_mjcf
 
         check_mjcf(file, check, output)
         return
-    formats: dict[str, tuple[Callable[..., Urdf | Mjcf], dict[str, Any]]] = {
-        "urdf": (
-            to_urdf,
-            {"limits": limits, "merge": merge, "collision": collision, "effort": effort, "velocity": velocity},
-        ),
-        "mjcf": (to_mjcf, {"mujoco": mujoco, "contact": contact, "fit": fit, "spline": spline, "driver": driver}),
-    }
+    formats = exporters("translate")
     if to not in formats:
-        raise OsimliteError(f"--to is 'urdf' or 'mjcf', not '{to}'")
-    for name, (_, choices) in formats.items():
-        strange = [choice for choice, value in choices.items() if value is not None and name != to]
+        raise OsimliteError(f"--to is {' or '.join(map(repr, formats))}, not '{to}'")
+    for name, exporter in formats.items():
+        strange = [each.name for each in exporter.choices if chosen[each.name] is not None and name != to]
         if strange:
             raise SettingError(f"--{strange[0]} is an option of --to {name}")
-    export, choices = formats[to]
-    given = {name: value for name, value in choices.items() if value is not None}
+    export = formats[to].write
+    given = {name: value for name, value in chosen.items() if value is not None}
     made = export(
         read(file), folder=file.parent, name=file.stem, geometry=options.mesh_folders(file, geometry), **given
     )

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
+from osimlite.choices import Choice
 from osimlite.cli import _options as options
-from osimlite.cli._command import Argument, Option, command
+from osimlite.cli._command import Argument, Option, command_with
+from osimlite.exporters import exporters
 
 if TYPE_CHECKING:
     from osimlite.view.shown import Shown
 
-SIZE = (1200, 900)
-"""Width and height of a screenshot, pixels."""
+
+def _choices() -> Iterator[Choice]:
+    for name, exporter in exporters("view").items():
+        yield Choice(name, Path | None, exporter.help, unit="FILE")
+        yield from exporter.choices
 
 
-@command
+@command_with(_choices)
 def view(
     file: options.File,
     motion: Annotated[Path | None, Argument(help="Coordinates over time, .sto or .mot.", show_default=False)] = None,
@@ -34,30 +39,9 @@ def view(
     ] = None,
     wrapping: options.Wrapping = "opensim",
     geometry: options.Geometry = None,
-    page: Annotated[
-        Path | None,
-        Option(
-            "--html", metavar="FILE", help="Write one page that needs no server and no network.", show_default=False
-        ),
-    ] = None,
-    glb: Annotated[
-        Path | None,
-        Option(metavar="FILE", help="Write a file for Blender, slides and web pages (glTF).", show_default=False),
-    ] = None,
-    rerun: Annotated[
-        Path | None,
-        Option(metavar="FILE", help="Write a recording for the Rerun viewer (.rrd).", show_default=False),
-    ] = None,
-    screenshot: Annotated[
-        Path | None,
-        Option(metavar="FILE", help="Write a picture (.png); needs no display.", show_default=False),
-    ] = None,
-    at: Annotated[
-        float | None,
-        Option("--at", metavar="SECONDS", help="The moment of the screenshot.", show_default="the first"),
-    ] = None,
     port: Annotated[int, Option(help="Serve the page at this port.", show_default="any that is free")] = 0,
     browser: options.Browser = True,
+    **chosen: Any,
 ) -> None:
     """Look at a model, and at a motion: bodies, contacts, muscles, the component tree, a slider for every coordinate.
 
@@ -84,15 +68,11 @@ def view(
     )
     for remark in shown.remarks:
         say(remark)
-    if page is not None:
-        say(f"wrote {shown.write_page(page)} ({page.stat().st_size / 1e6:.1f} MB)")
-    if glb is not None:
-        say(f"wrote {shown.write_glb(glb)} ({glb.stat().st_size / 1e6:.1f} MB)")
-    if rerun is not None:
-        say(f"wrote {shown.write_rrd(rerun)} ({rerun.stat().st_size / 1e6:.1f} MB); look at it with: rerun {rerun}")
-    if screenshot is not None:
-        say(f"wrote {shown.write_picture(screenshot, SIZE, at)}")
-    if page is None and glb is None and rerun is None and screenshot is None:
+    written = {name: each for name, each in exporters("view").items() if chosen[name] is not None}
+    for name, exporter in written.items():
+        choices = {each.name: chosen[each.name] for each in exporter.choices}
+        say(f"wrote {exporter.write(shown, chosen[name], **choices)}")
+    if not written:
         _serve(shown, port, browser=browser)
 
 
