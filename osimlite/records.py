@@ -156,6 +156,8 @@ class _AsDataclass:
             told |= {word: value for word, value in defaults.items() if value is not _NOTHING}
             made.append((name, Any, d.field(**told)))
         found: dict[str, Any] = d.make_dataclass(cls.__name__, made).__dict__["__dataclass_fields__"]
+        # The next one asks the class itself: to make them costs more than many a motion.
+        cls.__dataclass_fields__ = found
         return found
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -102,7 +101,7 @@ class Options:
 
     def changed(self, choices: Mapping[str, Any]) -> Options:
         """With other choices; errors as those of `of`."""
-        known = [item.name for item in fields(self)]
+        known = [*vars(self)]
         for name in choices:
             if name not in known:
                 raise SettingError(f"there is no option '{name}' of a simulation{or_known(name, known)}")
