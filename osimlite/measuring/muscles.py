@@ -14,6 +14,7 @@ from osimlite.lint.measures import Pose, Reach, Start
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
+from osimlite.schema.states import states_of
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kind import Kind, kind_of_class
 from osimlite.simulation.elements.parameters import Fields, Number, Numbers
@@ -41,12 +42,11 @@ class Fibers(NamedTuple):
     @property
     def is_elastic(self) -> bool:
         """Whether there is something to bring into equilibrium."""
-        kind = self.kind
-        return any(state.name in kind.settled and state.exists(self.component) for state in kind.states)
+        return not set(self.kind.settled).isdisjoint(states_of(self.component))
 
     def starts(self) -> dict[str, float]:
         """The states where they start."""
-        return {state.name: float(state.start(self.component)) for state in self.kind.states}
+        return {state.name: state.at_start(self.component) for state in self.kind.states}
 
     def settled(self, length: float, states: dict[str, float]) -> dict[str, float]:
         """The states in equilibrium at a length of the path (m), NaN if there is none."""

@@ -36,7 +36,8 @@ class Facts(NamedTuple):
     accelerations. Where nothing is said, OpenSim computes with the number.
 
     Attributes:
-        states: names of its state variables, in OpenSim's order; a class that names none has those of its base.
+        states: names of its state variables, in OpenSim's order; a class that names none has those of its base. A
+            component has ``name?flag`` if that property is true, ``name?!flag`` if it is false.
         outputs: what it adds to the outputs of its base, as OpenSim lists them: ``[]`` marks an output with channels,
             and a type follows the name unless it is a number.
         domains: by property, the numbers that OpenSim takes in this class, where they are fewer than for others that

@@ -71,7 +71,7 @@ class CoordinateLimitForce(ForceProducer):
     """
 
     facts = Facts(
-        states="dissipatedEnergy",
+        states="dissipatedEnergy?compute_dissipation_energy",
         zero={REFUSED: "transition", NAN: "upper_stiffness lower_stiffness"},
         doubts={"damping": "the limit adds energy"},
     )

@@ -86,6 +86,13 @@ class Muscle(PathActuator, abstract=True):
         return {}
 
 
+def whole_dynamics(muscle: Muscle) -> Iterator[Contradiction]:
+    """What OpenSim refuses of a muscle whose tendon is always elastic and whose activation never at once."""
+    for flag in ("ignore_tendon_compliance", "ignore_activation_dynamics"):
+        if getattr(muscle, flag):
+            yield flag, f"{flag} is true, which this class does not have"
+
+
 class ActivationFiberLengthMuscle(Muscle, abstract=True):
     """A muscle with two states: activation and fiber length."""
 
@@ -145,9 +152,7 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
 
     def contradictions(self) -> Iterator[Contradiction]:
         """Its tendon is elastic, its activation never at once, and force over velocity a line near its end only."""
-        for flag in ("ignore_tendon_compliance", "ignore_activation_dynamics"):
-            if getattr(self, flag):
-                yield flag, f"{flag} is true, which this class does not have"
+        yield from whole_dynamics(self)
         if self.fv_linear_extrap_threshold <= (least := 1 / self.Flen):
             yield "fv_linear_extrap_threshold", f"its fv_linear_extrap_threshold is not above 1/Flen, {least:.4g}"
         yield from _full_activation(self.minimum_activation)
@@ -157,7 +162,7 @@ class Millard2012EquilibriumMuscle(Muscle):
     """The muscle of Millard et al. (2013), tendon and fiber in equilibrium, with curves one can replace."""
 
     facts = Facts(
-        states="activation fiber_length",
+        states="activation?!ignore_activation_dynamics fiber_length?!ignore_tendon_compliance",
         outputs="passive_fiber_damping_force passive_fiber_damping_force_along_tendon passive_fiber_elastic_force "
         "passive_fiber_elastic_force_along_tendon",
         domains={"pennation_angle_at_optimal": BELOW_QUARTER_TURN, "maximum_pennation_angle": UP_TO_QUARTER_TURN},
@@ -283,7 +288,7 @@ class DeGrooteFregly2016Muscle(Muscle):
     """The muscle of De Groote et al. (2016), smooth everywhere, made for direct collocation."""
 
     facts = Facts(
-        states="activation normalized_tendon_force",
+        states="activation?!ignore_activation_dynamics normalized_tendon_force?!ignore_tendon_compliance",
         outputs="implicitenabled_normalized_tendon_force:bool implicitresidual_normalized_tendon_force "
         "passive_fiber_damping_force passive_fiber_damping_force_along_tendon passive_fiber_elastic_force "
         "passive_fiber_elastic_force_along_tendon statebounds_normalized_tendon_force:Vec2",
@@ -331,7 +336,7 @@ class MeyerFregly2016Muscle(Muscle):
     """A rigid-tendon muscle with the curves of Meyer et al. (2016)."""
 
     facts = Facts(
-        states="activation",
+        states="activation?!ignore_activation_dynamics",
         outputs="passive_fiber_damping_force passive_fiber_damping_force_along_tendon passive_fiber_elastic_force "
         "passive_fiber_elastic_force_along_tendon",
         domains={"pennation_angle_at_optimal": BELOW_QUARTER_TURN},

@@ -1,5 +1,6 @@
 """Muscle models that OpenSim keeps for old files only."""
 
+from collections.abc import Iterator
 from functools import partial
 from typing import Annotated
 
@@ -11,16 +12,20 @@ from osimlite.schema.default_curves import (
     passive_force_length,
     tendon_force_length,
 )
-from osimlite.schema.facts import NAN, Facts
+from osimlite.schema.facts import NAN, Contradiction, Facts
 from osimlite.schema.fields import LegacyOptional, Number, Single, real
 from osimlite.schema.functions import Function
-from osimlite.schema.muscles import Muscle
+from osimlite.schema.muscles import Muscle, whole_dynamics
 
 
 class ActivationFiberLengthMuscle_Deprecated(Muscle, abstract=True):
     """A muscle with two states: activation and fiber length."""
 
     facts = Facts(states="activation fiber_length")
+
+    def contradictions(self) -> Iterator[Contradiction]:
+        """Nothing of its dynamics can be left out."""
+        return whole_dynamics(self)
 
 
 class Thelen2003Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):

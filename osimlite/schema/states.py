@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from osimlite.schema.base import Component
 from osimlite.schema.outputs import outputs_of
@@ -12,21 +12,12 @@ if TYPE_CHECKING:
     from osimlite.schema.joints import Joint, MotionType
     from osimlite.schema.tree import Tree
 
-_WITHOUT: Final = {
-    "ignore_activation_dynamics": ("activation",),
-    "ignore_tendon_compliance": ("fiber_length", "normalized_tendon_force"),
-}
-"""The states that a component has not if this property is true."""
-
 
 def states_of(component: Component) -> list[str]:
     """The names of the state variables of one component, in OpenSim's order."""
     known = (base.__dict__["facts"].states for base in type(component).__mro__ if "facts" in base.__dict__)
-    own = next(filter(None, known), "").split()
-    if getattr(component, "compute_dissipation_energy", True) is False:
-        return []
-    gone = {name for flag, names in _WITHOUT.items() if getattr(component, flag, False) for name in names}
-    return [name for name in own if name not in gone]
+    words = [word.partition("?") for word in next(filter(None, known), "").split()]
+    return [name for name, _, flag in words if not flag or getattr(component, flag.lstrip("!")) != flag.startswith("!")]
 
 
 def motions_of(joint: Joint) -> dict[str, MotionType]:

@@ -70,6 +70,11 @@ REFUSED = {
     "right angle": curve("FiberCompressiveForceCosPennationCurve", ACCELERATION, engagement_angle_in_degrees=90),
     "rigid": muscle("<ignore_tendon_compliance>true</ignore_tendon_compliance>", THELEN),
     "excited": muscle("<ignore_activation_dynamics>true</ignore_activation_dynamics>", THELEN),
+    "old rigid": muscle("<ignore_tendon_compliance>true</ignore_tendon_compliance>", "Schutte1993Muscle_Deprecated"),
+    "old excited": muscle("<ignore_activation_dynamics>true</ignore_activation_dynamics>", "Delp1990Muscle_Deprecated"),
+    "first excited": muscle(
+        "<ignore_activation_dynamics>true</ignore_activation_dynamics>", "Thelen2003Muscle_Deprecated"
+    ),
     "early line": muscle("<fv_linear_extrap_threshold>0.7</fv_linear_extrap_threshold>", THELEN),
     "full": muscle("<min_control>1</min_control><minimum_activation>1</minimum_activation>"),
     "below": muscle("<minimum_activation>0.02</minimum_activation>"),

@@ -21,6 +21,7 @@ from typing import Any, ClassVar
 
 from osimlite.records import dataclass, field
 from osimlite.schema.actuators import Actuator
+from osimlite.schema.states import states_of
 from osimlite.simulation.elements.gather import ElementBuilder, module_name, module_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places, Response, Silent
@@ -40,19 +41,24 @@ class State:
 
     Attributes:
         name: as OpenSim has it.
-        start: value at the beginning, from the component.
-        exists: whether a component has it; the law is given 0 for one that it has not.
+        start: value at the beginning, from the component; its property `default_<name>` if left out, 0 if it has none.
         given: whether the law is given its value at all.
         output: name of the output that is its derivative; `<name>_rate` if left out.
         is_simbody: whether Simbody keeps it, in OpenSim.
     """
 
     name: str
-    start: Callable[[Any], float] = lambda component: 0.0
-    exists: Callable[[Any], bool] = lambda component: True
+    start: Callable[[Any], float] | None = None
     given: bool = True
     output: str = ""
     is_simbody: bool = False
+
+    def at_start(self, component: Any) -> float:
+        """Its value at the beginning."""
+        if self.start is not None:
+            return float(self.start(component))
+        name = f"default_{self.name}"
+        return float(getattr(component, name)) if name in type(component).model_fields else 0.0
 
     @property
     def rate(self) -> str:
@@ -129,8 +135,12 @@ class Kind:
         path = builder.path(force)
         if self.check is not None:
             self.check(builder, force)
+        # The law is given 0 for a state that a component has not.
+        own = states_of(force)
         states = tuple(
-            StateVariable(f"{path}/{state.name}", state.start(force), state.is_simbody) if state.exists(force) else None
+            StateVariable(f"{path}/{state.name}", state.at_start(force), state.is_simbody)
+            if state.name in own
+            else None
             for state in self.states
         )
         if not (force.appliesForce or self.goes_on):

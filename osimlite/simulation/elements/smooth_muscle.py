@@ -11,9 +11,7 @@ from osimlite.simulation.elements.kind import State
 from osimlite.simulation.elements.muscle import PENNATION, height
 from osimlite.simulation.elements.parameters import Fields, Number, positive
 
-ACTIVATION = State(
-    "activation", lambda force: force.default_activation, lambda force: not force.ignore_activation_dynamics
-)
+ACTIVATION = State("activation")
 
 
 def smooth_fields(timed: Callable[[ElementBuilder, Any], Any] = lambda builder, force: force) -> Fields:

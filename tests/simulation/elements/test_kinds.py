@@ -8,9 +8,12 @@ import re
 
 import pytest
 
+import osimlite
+from osimlite.schema.states import states_of
 from osimlite.simulation.elements.gather import module_name
 from osimlite.simulation.elements.kind import Kind, kind_of_class, kinds
 
+ALL_THREE = ["activation", "fiber_length", "fiber_velocity"]
 DECLARED = [kind for kind in kinds() if isinstance(kind, Kind)]
 
 
@@ -33,6 +36,33 @@ def test_the_kernel_follows_from_the_declaration(kind):
         assert f"= {state.rate}\n" in source
     for output in (kind.labels or {}).values():
         assert output in kind.recorded
+
+
+@pytest.mark.parametrize("kind", DECLARED, ids=lambda kind: kind.name)
+def test_the_states_are_those_that_the_class_declares(kind):
+    component = kind.component()
+    if "compute_dissipation_energy" in kind.component.model_fields:
+        component.compute_dissipation_energy = True
+    assert [state.name for state in kind.states] == states_of(component)
+
+
+@pytest.mark.parametrize(
+    ("cls", "without_activation", "without_tendon"),
+    [
+        ("Millard2012AccelerationMuscle", ALL_THREE, ALL_THREE),
+        ("Millard2012EquilibriumMuscle", ["fiber_length"], ["activation"]),
+        ("DeGrooteFregly2016Muscle", ["normalized_tendon_force"], ["activation"]),
+        ("MeyerFregly2016Muscle", [], ["activation"]),
+        ("RigidTendonMuscle", [], []),
+    ],
+)
+def test_the_states_that_are_left_are_opensims(cls, without_activation, without_tendon):
+    """As OpenSim 4.6 names them."""
+    for flag, left in (
+        ("ignore_activation_dynamics", without_activation),
+        ("ignore_tendon_compliance", without_tendon),
+    ):
+        assert states_of(getattr(osimlite, cls)(**{flag: True})) == left
 
 
 def test_a_law_takes_what_the_kernel_gives():

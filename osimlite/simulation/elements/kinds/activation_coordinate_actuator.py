@@ -19,7 +19,7 @@ KIND = Kind(
     outputs=("force", "activation_rate"),
     parameters=("optimal_force", positive("activation_time_constant")),
     controlled=True,
-    states=(State("activation", lambda actuator: actuator.default_activation),),
+    states=(State("activation"),),
     labels={"{name}": "force"},
     goes_on=True,
 )

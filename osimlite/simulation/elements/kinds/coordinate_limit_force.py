@@ -42,6 +42,6 @@ KIND = Kind(
     limit,
     outputs=("force", "dissipatedEnergy_rate", "energy"),
     parameters=(Numbers(6, _constants),),
-    states=(State("dissipatedEnergy", exists=lambda force: force.compute_dissipation_energy, given=False),),
+    states=(State("dissipatedEnergy", given=False),),
     labels={"{name}": "force", "{name}.PotentialEnergy": "energy"},
 )

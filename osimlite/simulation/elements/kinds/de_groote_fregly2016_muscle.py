@@ -39,11 +39,7 @@ KIND = muscle(
     Fields(SmoothTendon, (positive("passive_fiber_strain_at_one_norm_force"),), _tendon),
     states=(
         ACTIVATION,
-        State(
-            "normalized_tendon_force",
-            lambda force: force.default_normalized_tendon_force,
-            lambda force: not force.ignore_tendon_compliance,
-        ),
+        State("normalized_tendon_force"),
     ),
     equilibrium=degroote_equilibrium,
     settled=("normalized_tendon_force",),

@@ -80,9 +80,9 @@ KIND = muscle(
     curve("fiber_compressive_force_length_curve", COMPRESSIVE_SIZE, fiber_compressive_force_length),
     curve("fiber_compressive_force_cos_pennation_curve", COMPRESSIVE_SIZE, fiber_compressive_force_cos_pennation),
     states=(
-        State("activation", lambda force: force.default_activation),
-        State("fiber_length", lambda force: force.default_fiber_length, output="fiber_velocity"),
-        State("fiber_velocity", lambda force: force.default_fiber_velocity, output="fiber_acceleration"),
+        State("activation"),
+        State("fiber_length", output="fiber_velocity"),
+        State("fiber_velocity", output="fiber_acceleration"),
     ),
     equilibrium=millard2012_acceleration_equilibrium,
     settled=("fiber_length", "fiber_velocity"),

@@ -119,12 +119,10 @@ KIND = muscle(
         State(
             "activation",
             lambda force: min(max(force.default_activation, _least_activation(force)), 1.0),
-            lambda force: not force.ignore_activation_dynamics,
         ),
         State(
             "fiber_length",
             lambda force: max(force.default_fiber_length, _smallest(force)),
-            lambda force: not force.ignore_tendon_compliance,
             output="fiber_velocity",
         ),
     ),

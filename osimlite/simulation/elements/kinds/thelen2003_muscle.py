@@ -63,8 +63,8 @@ KIND = muscle(
         _others,
     ),
     states=(
-        State("activation", lambda force: force.default_activation),
-        State("fiber_length", lambda force: force.default_fiber_length, output="fiber_velocity"),
+        State("activation"),
+        State("fiber_length", output="fiber_velocity"),
     ),
     equilibrium=thelen2003_equilibrium,
     settled=("fiber_length",),
