@@ -43,15 +43,18 @@ def _composition(functions: tuple[Function, ...], span: tuple[float, float]) -> 
     unit = np.cos(np.linspace(0.0, np.pi, SAMPLES))
     values = np.stack([sampled(item, 0.5 * (low + high) + 0.5 * (high - low) * unit) for item in functions], axis=1)
 
-    def first(bends: Array) -> Polynomial:
-        bent = Polynomial((0.0, 1.0, *bends))
-        reached = bent(unit)
+    powers = np.vander(unit, DEGREE + 1, increasing=True)
+
+    def first(bends: Array) -> Array:
+        bent = np.array((0.0, 1.0, *bends))
+        reached = powers @ bent
         middle, half = 0.5 * (reached.max() + reached.min()), 0.5 * (reached.max() - reached.min())
-        found: Polynomial = (bent - middle) / half
+        bent[0] -= middle
+        found: Array = bent / half
         return found
 
     def second(bends: Array) -> tuple[Array, Array]:
-        basis = np.polynomial.chebyshev.chebvander(first(bends)(unit), DEGREE)
+        basis = np.polynomial.chebyshev.chebvander(powers @ first(bends), DEGREE)
         found: Array = np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], dtype=np.float64)
         return found, (basis @ found - values).ravel()
 
@@ -60,7 +63,7 @@ def _composition(functions: tuple[Function, ...], span: tuple[float, float]) -> 
     rows, _ = second(best.x)
     normal = Polynomial((-(low + high) / (high - low), 2.0 / (high - low)))
     slides = np.array([_padded(Chebyshev(row).convert(kind=Polynomial)) for row in rows.T])
-    return REACH * _padded(first(best.x)(normal)), slides / REACH ** np.arange(DEGREE + 1)
+    return REACH * _padded(Polynomial(first(best.x))(normal)), slides / REACH ** np.arange(DEGREE + 1)
 
 
 def _padded(polynomial: Polynomial) -> Array:

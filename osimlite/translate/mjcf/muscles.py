@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import ChainMap
+from collections.abc import Sequence
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -69,20 +70,22 @@ class Curves(NamedTuple):
 
     def tension(self, lengths: Array, activation: float) -> Array:
         """Tension (L,) that MuJoCo gives the muscle at lengths of its tendon (L,), m, at rest."""
-        x = (lengths - self.tendon) / self.fiber
-        low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
-        inner = np.where(x <= 1.0, (1.0 - x) / (1.0 - low), (x - 1.0) / (high - 1.0))
-        outer = np.where(x <= 1.0, (x - self.lmin) / (low - self.lmin), (self.lmax - x) / (self.lmax - high))
-        active = np.where((x < low) | (x > high), 0.5 * outer**2, 1.0 - 0.5 * inner**2)
-        active = np.where((x < self.lmin) | (x > self.lmax), 0.0, active)
-        stretch = np.maximum(x - self.shift - 1.0, 0.0) / (0.5 * (1.0 + self.end) - 1.0)
-        passive = self.fpmax * np.where(stretch <= 1.0, 0.5 * stretch**2, stretch - 0.5)
-        found: Array = self.force * (activation * active + passive)
+        found: Array = self.tensions(lengths, (activation,))[0]
         return found
 
-    def tensions(self, lengths: Array) -> Array:
-        """Tensions (A, L) at the activations that are compared."""
-        return np.stack([self.tension(lengths, activation) for activation in ACTIVATIONS])
+    def tensions(self, lengths: Array, activations: Sequence[float] = ACTIVATIONS) -> Array:
+        """Tensions (A, L) at several activations, by default those that are compared."""
+        x = (lengths - self.tendon) / self.fiber
+        low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
+        short = x <= 1.0
+        inner = np.where(short, (1.0 - x) / (1.0 - low), (x - 1.0) / (high - 1.0))
+        outer = np.where(short, (x - self.lmin) / (low - self.lmin), (self.lmax - x) / (self.lmax - high))
+        active = np.where((x < low) | (x > high), 0.5 * outer**2, 1.0 - 0.5 * inner**2)
+        active[(x < self.lmin) | (x > self.lmax)] = 0.0
+        stretch = np.maximum(x - self.shift - 1.0, 0.0) / (0.5 * (1.0 + self.end) - 1.0)
+        passive = self.fpmax * np.where(stretch <= 1.0, 0.5 * stretch**2, stretch - 0.5)
+        found: Array = self.force * (np.multiply.outer(activations, active) + passive)
+        return found
 
     @classmethod
     def read(cls, lengthrange: Array, gain: Array, bias: Array) -> Curves:
