@@ -11,6 +11,7 @@ from osimlite.cli._console import complain, hand_over, print_diff, say, show, wa
 from osimlite.cli._progress import progress_bar
 from osimlite.errors import MissingFileError, OsimliteError
 from osimlite.files import read_standard_input, unsaved
+from osimlite.lint import measures
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
 from osimlite.lint.many import check_files, settings_of
@@ -74,6 +75,8 @@ def run(
     if fix or unsafe_fixes:
         count, left, failed = _mend_all(files, given, unsafe=unsafe_fixes)
         say(f"Mended {counted(count, 'place')}{_more(left)}.", err=True)
+    # Somebody who looks on is told what is not measured yet.
+    measures.waits = not sys.stderr.isatty()
     with progress_bar("checking", len(files)) as progress:
         report = check_files(files, given, cached=cached, progress=progress)
     report.passed = passed

@@ -48,8 +48,8 @@ class Checked:
         """Whether a rule has anything to look at."""
         return rule.about == self.about
 
-    def unmeasured(self) -> str:
-        """Measure what rules about measures speak of; why that cannot be done, if it cannot."""
+    def unmeasured(self, *, anew: bool = True) -> str:
+        """Measure what rules about measures speak of, or recall it; why that cannot be done, if it cannot."""
         return ""
 
     def path(self, item: Object | None) -> str:

@@ -276,17 +276,20 @@ def _subject_of(found: Survey, config: Config | None) -> Subject:
 
 
 @collector_paused()
-def run(subject: Checked, *, measure: bool = True) -> Report:
+def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Report:
     """Run every rule that is wanted, and return all findings sorted by place.
 
     Args:
         subject: what is checked.
         measure: whether rules run that are about what is measured of paths and muscles, which takes longer.
+        recall: whether they run too where it was measured before.
     """
     findings: list[Finding] = []
     wanted = [known for known in all_rules() if subject.config.wants(known) and subject.is_for(known)]
     measuring = [known for known in wanted if known.about == MEASURES]
-    why_not = "" if not measuring else subject.unmeasured() if measure else "nobody asked"
+    why_not = ""
+    if measuring:
+        why_not = subject.unmeasured(anew=measure) if measure or recall else "nobody asked"
     left_out = measuring if why_not else []
     checks: dict[Check, dict[str, Rule]] = {}
     for known in wanted:

@@ -176,13 +176,27 @@ def swept_places(measures: Measures) -> set[int]:
     return {place for places in measures.swept.values() for place in places}
 
 
+class NotYetError(OsimliteError):
+    """What it takes to measure a model is being made."""
+
+
+waits = True
+"""Whether machine code that is in no file yet is waited for: some ten seconds, once. Programs do; people at a terminal
+and editors are told, while another process makes it."""
+
+
 def has_measures(subject: Subject) -> bool:
     """Whether a model has muscles, or paths whose lengths do not follow from fixed points."""
     return any(next(subject.named(name), None) is not None for name in _MEASURED)
 
 
-def unmeasured(subject: Subject) -> str:
-    """Measure a model; why that cannot be done, if it cannot."""
+def unmeasured(subject: Subject, *, anew: bool = True) -> str:
+    """Measure a model; why that cannot be done, if it cannot.
+
+    Args:
+        subject: with the model.
+        anew: whether more is done than to recall what was measured before.
+    """
     from osimlite.lint.parts import parts_of, recall, remember
     from osimlite.schema.tree import lent
 
@@ -197,14 +211,18 @@ def unmeasured(subject: Subject) -> str:
         if still.swept.keys() == parts.paths.keys() and swept_places(still) == swept_places(known.measures):
             subject.kept[MEASURES] = still
             return ""
+    if not anew:
+        return "nobody asked"
     try:
         measured = import_module("osimlite.measuring").measured
         assert subject.model is not None
+        may_wait = waits and subject.waits
+        known_of = None if parts is None or known is None else (known.measures, known.of(parts))
         with lent(subject.tree):
-            if parts is not None and known is not None:
-                found = measured(subject.model, compiles=compiles, known=known.measures, still=known.of(parts))
-            else:
-                found = measured(subject.model, compiles=compiles)
+            found = measured(subject.model, compiles=compiles, waits=may_wait, known=known_of)
+    except NotYetError as error:
+        subject.is_unsettled = True
+        return error.message
     except OsimliteError as error:
         return error.message
     except (ArithmeticError, ValueError) as error:

@@ -48,7 +48,8 @@ def once(make: Callable[Concatenate[S, P], Made]) -> Callable[Concatenate[S, P],
 class Subject(Checked):
     """One model under check. `source` is None for a model made in Python, `model` for a text that cannot be read.
 
-    `top` is the object at the top of the document, whatever it is; `kept_in` the folder for what is measured of it.
+    `top` is the object at the top of the document, whatever it is; `kept_in` the folder for what is measured of it. It
+    `waits` for machine code; if not, and that is not there, it `is_unsettled`: the next check may find more.
     """
 
     def __init__(self, found: Survey | Model, config: Config | None = None) -> None:
@@ -61,6 +62,7 @@ class Subject(Checked):
         self.refusals: list[Refusal] = []
         self.kept: dict[object, object] = {}
         self.kept_in: Path | None = None
+        self.waits, self.is_unsettled = True, False
         if isinstance(found, Model):
             self.model = self.top = found
         else:
@@ -93,9 +95,9 @@ class Subject(Checked):
             return self.source is not None
         return self.model is not None and (self.sure_until is None or rule.code[4] in "12")
 
-    def unmeasured(self) -> str:
-        """Measure paths and muscles of the model; why that cannot be done, if it cannot."""
-        return unmeasured(self)
+    def unmeasured(self, *, anew: bool = True) -> str:
+        """Measure paths and muscles of the model, or recall it; why that cannot be done, if it cannot."""
+        return unmeasured(self, anew=anew)
 
     @cached_property
     def folder(self) -> Path | None:
@@ -258,9 +260,9 @@ class Subject(Checked):
 
     def outside(self) -> list[str] | None:
         """Every path outside the text that findings may depend on; None if nobody can say."""
-        if any(note.kind == "include" for note in self.notes) or any(
-            isinstance(fault, SpecialFileError) for fault in self.faults
-        ):
+        if self.is_unsettled or any(note.kind == "include" for note in self.notes):
+            return None
+        if any(isinstance(fault, SpecialFileError) for fault in self.faults):
             return None
         folder = self.folder
         if folder is None or self.model is None:

@@ -9,10 +9,12 @@ from typing import NamedTuple
 
 from osimlite.document.source import Position, Source
 from osimlite.document.spans import Span
+from osimlite.document.survey import survey
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report
-from osimlite.lint.engine import run, subject_in, use_classes
+from osimlite.lint.engine import all_rules, run, subject_in, use_classes
+from osimlite.lint.measures import MEASURES
 from osimlite.lint.ours import BEGINNING, is_ours
 from osimlite.lint.settings import settings_for
 from osimlite.lint.setup import Setup
@@ -22,6 +24,7 @@ from osimlite.lsp.cursor import Cursor, cursor_at
 from osimlite.lsp.text import Text
 from osimlite.schema.base import Component, Object
 from osimlite.schema.editing import named_by
+from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree, Use, is_a
 
 
@@ -51,11 +54,13 @@ class Analysis:
     Args:
         text: of the file.
         file: its path; it need not exist.
+        recalls: whether findings about paths and muscles that were measured before are among what is found.
     """
 
-    def __init__(self, text: Text, file: str) -> None:
+    def __init__(self, text: Text, file: str, *, recalls: bool = False) -> None:
         self.text = text
         self.file = file
+        self.recalls = recalls
         self.is_table = is_table(file)
         beginning = text.content[:BEGINNING].encode("utf-8", "replace")
         self.is_foreign = file.lower().endswith(".xml") and not is_ours(beginning)
@@ -93,8 +98,27 @@ class Analysis:
     @cached_property
     def report(self) -> Report:
         """What the rules find."""
-        # Measuring paths takes too long for every change of a text; `osimlite validate` does it.
-        return Report([]) if self.is_foreign else run(self.subject, measure=False)
+        # Measuring paths takes too long for every change of a text.
+        return Report([]) if self.is_foreign else run(self.subject, measure=False, recall=self.recalls)
+
+    @property
+    def is_to_be_measured(self) -> bool:
+        """Whether there are paths or muscles that nobody has measured."""
+        subject = self.document
+        if subject is None or subject.model is None or subject.config.classes or MEASURES in subject.kept:
+            return False
+        return any(known.about == MEASURES and subject.is_for(known) for known in all_rules())
+
+    def measured(self) -> Report | None:
+        """What the rules find once paths and muscles are measured; None as long as what that takes is being made.
+
+        For another thread: it reads the text anew, and shares nothing with who answers questions meanwhile.
+        """
+        source = Source.of_characters(self.text.content, self.file)
+        subject = Subject(survey(source, of=Model), self.config)
+        subject.waits = False
+        report = run(subject)
+        return None if subject.is_unsettled else report
 
     @property
     def is_checked(self) -> bool:

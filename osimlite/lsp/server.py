@@ -32,6 +32,10 @@ LONG_PAUSE = 0.4
 """And that of what depends on what is typed, s."""
 LONGEST_PAUSE = 2.0
 """Of a file whose check takes long, s."""
+MEASURING_PAUSE = 1.0
+"""Paths and muscles are measured, in another thread, when nothing has been typed for so long, s."""
+MAKING_PAUSE = 20.0
+"""And again if what that takes was still being made, s."""
 
 
 class Asked(typing.Protocol):
@@ -66,7 +70,7 @@ class Server(LanguageServer):
 
     def show(self, uri: str, text: Text) -> Analysis:
         """Take a new version of a file."""
-        found = self.project.open[uri] = Analysis(text, to_fs_path(uri) or uri)
+        found = self.project.open[uri] = Analysis(text, to_fs_path(uri) or uri, recalls=True)
         return found
 
     def check(self, uri: str, pause: float = PAUSE) -> None:
@@ -102,13 +106,29 @@ class Server(LanguageServer):
             self.report_server_error(error, FeatureRequestError)
             return
         self._took[uri] = min(time.monotonic() - began, LONGEST_PAUSE)
-        document = self.workspace.text_documents.get(uri)
-        version = None if document is None else document.version
-        self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, found, version))
+        self._publish(uri, found)
         if analysis.is_certain:
             self.project.known[uri] = analysis
             if self.project.hold(analysis):
                 self.check_again(self.project.depending_on(analysis), LONG_PAUSE)
+        if analysis.is_to_be_measured:
+            await self._measure(uri, analysis)
+
+    async def _measure(self, uri: str, analysis: Analysis) -> None:
+        await asyncio.sleep(MEASURING_PAUSE)
+        try:
+            while (report := await asyncio.to_thread(analysis.measured)) is None:
+                await asyncio.sleep(MAKING_PAUSE)
+        except Exception as error:
+            self.report_server_error(error, FeatureRequestError)
+            return
+        analysis.report = report
+        self._publish(uri, diagnostics(analysis))
+
+    def _publish(self, uri: str, found: list[types.Diagnostic]) -> None:
+        document = self.workspace.text_documents.get(uri)
+        version = None if document is None else document.version
+        self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, found, version))
 
     def at(self, place: Asked) -> tuple[Analysis, int]:
         """The file that a question is about, and the offset in it.

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from osimlite.lint.measures import LengthOnSurface, Measures, Pose, swept_places, together
+from osimlite.lint.measures import LengthOnSurface, Measures, NotYetError, Pose, swept_places, together
 from osimlite.measuring.jumps import jumps
 from osimlite.measuring.muscles import fibers_of, reach_of, start_of
 from osimlite.measuring.points import moving_points
@@ -16,38 +16,49 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.gather import GEODESIC
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
+from osimlite.simulation.engines import ahead
 from osimlite.simulation.engines.linking import AT_HAND
 from osimlite.simulation.paths import Paths
+
+TOLD = "machine code for so many surfaces is being made, which takes some ten seconds and is done once; run it again"
 
 MIDDLE = 0.5
 """Part of a range in which fibers are looked at: at the ends, few muscles have not reached a limit."""
 
 
 @np.errstate(all="ignore")
-def measured(model: Model, *, compiles: bool, known: Measures | None = None, still: Measures | None = None) -> Measures:
+def measured(
+    model: Model, *, compiles: bool, waits: bool = True, known: tuple[Measures, Measures] | None = None
+) -> Measures:
     """Measure the paths and muscles of a model.
 
     Args:
         model: what is measured.
         compiles: whether machine code is made that is in no file yet, which takes longer than to do without for a
             model that has few surfaces.
-        known: what was measured when some paths were others, or not there, and all else as it is.
-        still: what of it holds.
+        waits: whether it is waited for; else another process makes it.
+        known: what was measured when some paths were others, or not there, and all else as it is; and what still holds.
 
     Raises:
         UnsupportedError: a path, a joint or a constraint cannot be computed.
         ModelError: something makes no sense.
         SimulationError: the constraints allow no default pose, or there are no lengths in it.
+        NotYetError: machine code is not there, and not waited for.
     """
-    code = None if compiles else AT_HAND
-    paths = Paths(model, code=code, left_out=() if still is None else still.swept)
+    before, still = known if known is not None else (None, None)
+    code = AT_HAND if not compiles else None if waits or not ahead.is_possible() else ahead.Later()
+    paths = Paths(model, code=code, left_out=still.swept if still is not None else ())
+    has_surfaces = any(isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values())
+    around = paths.around_surfaces(model, GEODESIC, code) if has_surfaces else None
+    if isinstance(code, ahead.Later) and code.missing:
+        ahead.begin(code.missing)
+        raise NotYetError(TOLD)
     start = paths.mechanism.assemble({})
     default = np.array(list(paths.lengths(start).values()))
     looked_at = sweeps(paths, start, set() if still is None else swept_places(still))
-    if known is not None and {sweep.place for sweep in looked_at} != swept_places(known):
+    if before is not None and {sweep.place for sweep in looked_at} != swept_places(before):
         # All paths are looked at in the same poses.
-        return measured(model, compiles=compiles)
-    has_surfaces = any(isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values())
+        return measured(model, compiles=compiles, waits=waits)
     starts, reaches = [], []
     ends = dict(zip(paths.names, zip(default, _ends(looked_at, default), strict=True), strict=True))
     for fibers in fibers_of(model, paths.mechanism, ends):
@@ -58,7 +69,7 @@ def measured(model: Model, *, compiles: bool, known: Measures | None = None, sti
     moved = {sweep.place: sweep.moved for sweep in looked_at}
     found = Measures(
         {name: tuple(place for place, own in moved.items() if own[k]) for k, name in enumerate(paths.names)},
-        [*wrappings(paths.around_surfaces(model, GEODESIC, code), paths, start, looked_at)] if has_surfaces else [],
+        [*wrappings(around, paths, start, looked_at)] if around is not None else [],
         [*jumps(paths, looked_at)],
         [*_on_surfaces(paths, start, looked_at)],
         [*moving_points(paths)],

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from osimlite.document.source import Source
-from osimlite.lint import Config, measures, validate
+from osimlite.lint import Config, measures, parts, validate
 from osimlite.lint.many import check_files
 from osimlite.lint.reporters import render
 from osimlite.multibody.parts import CoordinateInfo
@@ -105,3 +105,28 @@ def test_the_language_server_does_not_measure(jumping):
 def test_a_value_is_told_in_the_unit_of_what_the_coordinate_moves(motion, said):
     info = CoordinateInfo("q", "/jointset/j/q", "/jointset/j", motion)
     assert str(measures.Value(info.name, 0.5, info.unit)) == f"'q' = {said}"
+
+
+@pytest.fixture
+def begun(monkeypatch):
+    """Nothing is compiled, and what would be is noted here."""
+    from osimlite.simulation.engines import ahead, machine_code
+
+    names: list[str] = []
+    monkeypatch.setattr(machine_code, "is_at_hand", lambda name: False)
+    monkeypatch.setattr(ahead, "begin", names.extend)
+    monkeypatch.setattr(measures, "FEW", -1)
+    monkeypatch.setattr(measures, "waits", False)
+    parts._memory.clear()
+    return names
+
+
+@pytest.mark.skipif("numba" in measures.absent(), reason="numba is not installed")
+def test_nobody_who_looks_on_waits_for_a_compiler(jumping, begun, monkeypatch):
+    report = check_files([str(jumping)], Config())
+    (why,) = report.unmeasured
+    assert "machine code" in why and "run it again" in why
+    assert not report.findings and {"evaluate", "watch", "straight_path"} <= set(begun)
+    monkeypatch.undo()
+    parts._memory.clear()
+    assert check_files([str(jumping)], Config()).codes == {"OSIM632": 2}

@@ -33,9 +33,8 @@ def asked(monkeypatch):
     own = osimlite.measuring.measured
 
     def measured(model, **given):
-        still = given.get("still")
         result = own(model, **given)
-        found.append(sorted(set(result.swept) - set(still.swept if still is not None else ())))
+        found.append(sorted(set(result.swept) - set(given["known"][1].swept if given["known"] else ())))
         return result
 
     monkeypatch.setattr(osimlite.measuring, "measured", measured)

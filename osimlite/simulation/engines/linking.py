@@ -121,8 +121,11 @@ class _Compiled(Code):
         return int(ctypes.cast(callback, ctypes.c_void_p).value or 0), callback
 
 
-class _AtHand(_Compiled):
+class AtHand(_Compiled):
+    """Machine code if all of it is in files, else Python."""
+
     def chosen_for(self, functions: Sequence[str]) -> Code:
+        """Whichever it is."""
         if has_compiler():
             from osimlite.simulation.engines.machine_code import is_at_hand
 
@@ -151,7 +154,7 @@ class _Python(Code):
 
 
 COMPILED, PYTHON = _Compiled("machine code"), _Python("Python")
-AT_HAND = _AtHand("machine code that is in files, or Python")
+AT_HAND = AtHand("machine code that is in files, or Python")
 """For those who evaluate so little that Python is sooner done than the compiler."""
 
 

@@ -13,7 +13,9 @@ import logging
 import os
 import re
 import sys
+import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -32,6 +34,9 @@ FOLDER = "NUMBA_CACHE_DIR"
 
 TESTED = ">=0.62,<0.69"
 """The versions of numba with whose internals `compiler.py` was tried; pyproject.toml asks for one of them."""
+
+LONGEST = 300.0
+"""What a process has left behind after so long (s) is from one that was ended."""
 
 _kept: list[Any] = []
 """Machine code stays where it is as long as this does."""
@@ -146,6 +151,28 @@ def numba_version() -> str:
     from importlib.metadata import version
 
     return version("numba")
+
+
+@contextmanager
+def alone() -> Iterator[bool]:
+    """Whether no other process of the user makes code where nobody waits for it."""
+    for folder in _folders():
+        place = folder / "compiling"
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if place.exists() and time.time() - place.stat().st_mtime > LONGEST:
+                place.unlink()
+            os.close(os.open(place, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
+        except FileExistsError:
+            break
+        except OSError:
+            continue
+        try:
+            yield True
+        finally:
+            place.unlink(missing_ok=True)
+        return
+    yield False
 
 
 def _folders() -> Iterator[Path]:
