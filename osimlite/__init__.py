@@ -2,8 +2,8 @@
 
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
 ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``inverse_kinematics``,
-``FrameSolver``, ``scale``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``).
-Names are imported when first used, so that importing osimlite costs nothing.
+``FrameSolver``, ``scale``, ``run``, the errors, and every component class under OpenSim's own name
+(``osimlite.PinJoint``). Names are imported when first used, so that importing osimlite costs nothing.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from osimlite.simulation import simulate as simulate
     from osimlite.simulation.muscle_curves import muscle_curves as muscle_curves
     from osimlite.simulation.paths import paths as paths
+    from osimlite.tools.running import run as run
     from osimlite.translate import to_mjcf as to_mjcf
     from osimlite.translate import to_urdf as to_urdf
 
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
         "read",
         "read_document",
         "read_text",
+        "run",
         "scale",
         "simulate",
         "to_mjcf",
@@ -71,6 +73,7 @@ _FUNCTIONS = {
     "to_urdf": "osimlite.translate",
     "muscle_curves": "osimlite.simulation.muscle_curves",
     "paths": "osimlite.simulation.paths",
+    "run": "osimlite.tools.running",
     "simulate": "osimlite.simulation",
     "OsimliteError": "osimlite.errors",
 }

@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import os
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -41,6 +42,11 @@ def module_of_file(path: Path) -> ModuleType:
     with imports_beside(place), errors_placed(place):
         spec.loader.exec_module(module)
     return module
+
+
+def module_name(name: str) -> str:
+    """The module that declares what osimlite makes of a class: PathSpring is in path_spring."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
 
 
 def module_named(name: str) -> ModuleType:

@@ -18,9 +18,12 @@ if TYPE_CHECKING:
 
 COMMANDS = (
     "build", "validate", "rule", "format", "upgrade", "diff", "info", "translate", "view", "simulate", "sweep",
-    "optimize", "gait", "find-gait", "muscles", "kinematics", "inverse-dynamics", "lsp", "doctor", "demo",
+    "optimize", "gait", "find-gait", "muscles", "kinematics", "inverse-dynamics", "run", "lsp", "doctor", "demo",
 )  # fmt: skip
 """Every command in the order of the help; ``osimlite.cli.<name>.<name>``, with _ for -, is its function."""
+
+ALIASES = {"run-tool": "run"}
+"""Other spellings of commands: `opensim-cmd` says it so."""
 
 COMPLETING = "_OSIMLITE_COMPLETE"
 """Set by a shell that asks how a word can go on."""
@@ -110,6 +113,7 @@ def _run(words: list[str]) -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # Matrices of mechanisms are small: the threads of OpenBLAS would only wait, and keep a core busy with that.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    words = [ALIASES.get(words[0], words[0]), *words[1:]] if words else words
     # Only the command that is asked for is loaded; without one, all are, for the help.
     names = words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS
     try:

@@ -26,6 +26,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "simulate": ("numpy",),
     "kinematics": ("numpy",),
     "inverse-dynamics": ("numpy", "scipy"),
+    "run": ("numpy", "scipy"),
     "view": ("numpy",),
     "gait": ("numpy",),
     "simulate --engine compiled": ("numpy", "numba"),

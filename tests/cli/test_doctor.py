@@ -62,6 +62,7 @@ EXAMPLES = {
     "simulate": "simulate w.osim --to 0.005",
     "kinematics": "kinematics w.osim m.mot",
     "inverse-dynamics": "inverse-dynamics w.osim m.mot",
+    "run": "run setup.xml",
     "view": "view w.osim --html v.html",
     "gait": "gait w.osim --to 0.05",
     "simulate --engine bullet": "simulate w.osim --to 0.005 --engine bullet",
@@ -89,7 +90,12 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
     model = dynamic_walker()
     write(model, place / "w.osim")
     write_data(model, place / "w.yaml")
-    (place / "m.mot").write_text("m\nversion=1\nendheader\ntime Pelvis_tx\n" + "".join(f"0.{k} 0\n" for k in range(9)))
+    (place / "setup.xml").write_text(
+        "<OpenSimDocument Version='40600'><InverseDynamicsTool><model_file>w.osim</model_file>"
+        "<coordinates_file>m.mot</coordinates_file></InverseDynamicsTool></OpenSimDocument>"
+    )
+    rows = "".join(f"0.{k} 0\n" for k in range(9))
+    (place / "m.mot").write_text(f"m\nversion=1\nnRows=9\nnColumns=2\nendheader\ntime Pelvis_tx\n{rows}")
     return place
 
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from osimlite._load import module_name
 from osimlite.forces import muscle_curves
 from osimlite.forces.bezier import LAST, curve_integral, curve_value
-from osimlite.simulation.elements.gather import module_name
 
 MORE = {"force_velocity_inverse": lambda *numbers: muscle_curves.force_velocity(*numbers, inverse=True)}
 
@@ -19,7 +19,7 @@ MORE = {"force_velocity_inverse": lambda *numbers: muscle_curves.force_velocity(
 def curves(fixtures):
     for found in json.loads(gzip.decompress((fixtures / "muscles" / "curves.json.gz").read_bytes())):
         if found["curve"].endswith("Curve"):
-            name = module_name(type(found["curve"].removesuffix("Curve"), (), {}))
+            name = module_name(found["curve"].removesuffix("Curve"))
             make = MORE.get(name) or getattr(muscle_curves, name)
             yield found, make(*[value for key, value in found["params"].items() if key != "fitted"])
 

@@ -8,11 +8,11 @@ from importlib import import_module
 from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
-from re import sub
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from osimlite._load import module_name
 from osimlite.errors import ModelError, SettingError, UnsupportedError
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import FramePlacement, Mechanism
@@ -262,14 +262,9 @@ def kind_of(component: Any) -> str:
     return getattr(component, "class_name", "") or type(component).__name__
 
 
-def module_name(component: type) -> str:
-    """The module that declares what osimlite makes of a class: PathSpring is in path_spring."""
-    return sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", component.__name__).lower()
-
-
 def module_of(package: str, component: type) -> Any:
     """The module of the elements that declares what is made of a class; None if there is none."""
-    name = f"{__package__}.{package}.{module_name(component)}"
+    name = f"{__package__}.{package}.{module_name(component.__name__)}"
     return import_module(name) if find_spec(name) is not None else None
 
 

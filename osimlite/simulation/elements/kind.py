@@ -19,10 +19,11 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, ClassVar
 
+from osimlite._load import module_name
 from osimlite.records import dataclass, field
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.states import states_of
-from osimlite.simulation.elements.gather import ElementBuilder, module_name, module_of
+from osimlite.simulation.elements.gather import ElementBuilder, module_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places, Response, Silent
 from osimlite.simulation.elements.kernel_text import SOLVED, KernelText
@@ -123,7 +124,7 @@ class Kind:
     @property
     def name(self) -> str:
         """Of its kernel, and of the module that declares it."""
-        return module_name(self.component)
+        return module_name(self.component.__name__)
 
     def make(self, builder: ElementBuilder, force: Any) -> DeclaredForce:
         """The element of a component.

@@ -16,11 +16,12 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache, cached_property
 from typing import Any, NamedTuple
 
+from osimlite._load import module_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody.functions import Function
 from osimlite.quantity import tell
 from osimlite.records import dataclass
-from osimlite.simulation.elements.gather import ElementBuilder, module_name, module_of
+from osimlite.simulation.elements.gather import ElementBuilder, module_of
 from osimlite.simulation.elements.items import CONTROLS, ForceElement, Item, Places, Silent
 from osimlite.simulation.elements.kernel_text import written
 from osimlite.simulation.elements.kind import DeclaredForce
@@ -89,7 +90,7 @@ class ProbeKind:
     @property
     def name(self) -> str:
         """Of its kernel, and of the module that declares it."""
-        return module_name(self.component)
+        return module_name(self.component.__name__)
 
     @cached_property
     def kernel(self) -> Callable[..., int]:

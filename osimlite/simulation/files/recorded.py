@@ -143,22 +143,41 @@ class RecordedMotion:
         )
         return first, second
 
-    def lowpassed(self, cutoff: float) -> RecordedMotion:
+    def lowpassed(self, cutoff: float, *, continued: bool = False) -> RecordedMotion:
         """The motion through OpenSim's low-pass filter of `cutoff` Hz, at even times.
+
+        Args:
+            cutoff: frequency, Hz.
+            continued: whether what the filter adds at both ends, half the length of the motion each, is part of it.
 
         Raises:
             SettingError: the frequency is not positive, or too high for the times, or there are fewer than six.
         """
         self._require_times("a filter needs")
         times, values = lowpassed(self.times, self.values, cutoff)
+        if continued:
+            return replace(self, times=times, values=values, around=None)
         # What the filter adds at the ends nobody has recorded.
         slack = 1e-6 * (times[1] - times[0])
         own = (times >= self.times[0] - slack) & (times <= self.times[-1] + slack)
         return replace(self, times=times[own], values=values[own], around=(times, values))
 
+    def between(self, first: float, last: float) -> RecordedMotion:
+        """The motion from the time (s) at or before `first` to that at or before `last`, of which it has one at least.
+
+        Raises:
+            SettingError: `last` is before `first`.
+        """
+        if not first <= last:
+            raise SettingError(f"the times from {first:g} s to {last:g} s are none; give the first time first")
+        start, end = (max(0, int(np.searchsorted(self.times, time, side="right")) - 1) for time in (first, last))
+        around = self.around or (self.times, self.values)
+        return replace(self, times=self.times[start : end + 1], values=self.values[start : end + 1], around=around)
+
     def _require_times(self, what: str) -> None:
-        if len(self.times) < 2 * _HALF_ORDER:
-            raise SettingError(f"the motion has {len(self.times)} times; {what} at least {2 * _HALF_ORDER}")
+        count = len(self.around[0] if self.around else self.times)
+        if count < 2 * _HALF_ORDER:
+            raise SettingError(f"the motion has {count} times; {what} at least {2 * _HALF_ORDER}")
 
     def assembled(self) -> RecordedMotion:
         """The motion with every pose changed as little as the constraints demand.

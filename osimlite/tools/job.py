@@ -1,0 +1,85 @@
+"""What a tool is told to do: its setup, and where its files are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from osimlite.document.part import read_object
+from osimlite.document.reader import read
+from osimlite.errors import DocumentError
+from osimlite.records import dataclass
+from osimlite.schema.model import Model
+
+NONE = frozenset(("", "Unassigned"))
+"""What stands for no file."""
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A setup that is run.
+
+    Attributes:
+        setup: what the document says.
+        file: the document.
+        output: folder for all results, in place of those that the setup names.
+    """
+
+    setup: Any
+    file: Path
+    output: Path | None = None
+
+    def error(self, message: str) -> DocumentError:
+        """An error of the setup."""
+        return DocumentError(message, file=str(self.file))
+
+    def path(self, tag: str) -> Path | None:
+        """The file that a property names; None if it names none.
+
+        It is looked for from the folder of the setup, then from that in which the program runs. OpenSim looks for the
+        models of some tools in the second only, and crashes without.
+        """
+        return self.place(str(getattr(self.setup, tag)))
+
+    def place(self, name: str) -> Path | None:
+        """Where a file is that the setup names, as for :meth:`path`."""
+        name = name.strip()
+        if name in NONE:
+            return None
+        there, here = self.file.parent / name, Path(name)
+        return here if not there.exists() and here.exists() else there
+
+    def needed(self, *tags: str) -> Path:
+        """The file that one of some properties names.
+
+        Raises:
+            DocumentError: none does.
+        """
+        for tag in tags:
+            if (path := self.path(tag)) is not None:
+                return path
+        raise self.error(f"it names no {' or '.join(tags)}; give it one")
+
+    def model(self) -> Model:
+        """The model that the setup names, read anew.
+
+        Raises:
+            DocumentError: it names none, or that cannot be read.
+        """
+        return read(self.needed("model_file"))
+
+    def read(self, path: Path, cls: type) -> Any:
+        """An object of a class that another document holds."""
+        return read_object(path, cls)
+
+    def result(self, name: str) -> Path:
+        """Where a file of results goes that the setup names by itself: its `results_directory` does not count."""
+        return self._put(Path(name), self.file.parent)
+
+    def in_results(self, name: str) -> Path:
+        """Where a file of results goes: into the `results_directory`, of which OpenSim makes the last part only."""
+        folder = self.setup.results_directory.strip()
+        return self._put(Path(name), self.file.parent / ("" if folder in NONE else folder))
+
+    def _put(self, name: Path, folder: Path) -> Path:
+        return folder / name if self.output is None else self.output / name.name

@@ -1,0 +1,98 @@
+"""Running a setup: it is checked, its tool is found and run, and what came out is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+
+from osimlite._load import module_name
+from osimlite.document.reader import read_any
+from osimlite.errors import DocumentError, UnsupportedError
+from osimlite.lint.config import Config
+from osimlite.lint.diagnostic import Report, merged
+from osimlite.lint.engine import run as checked
+from osimlite.lint.engine import subject_of
+from osimlite.lint.many import settings_of
+from osimlite.lint.setup import Setup
+from osimlite.lint.suffixes import is_table
+from osimlite.schema.registry import MODULES
+from osimlite.text import counted, listed
+from osimlite.tools.job import Job
+from osimlite.tools.outcome import Outcome
+
+
+class FaultySetup(DocumentError):
+    """A setup, or what it names, has errors.
+
+    Attributes:
+        report: all that was found.
+    """
+
+    def __init__(self, report: Report) -> None:
+        first, *others = report.errors
+        more = f"; and {counted(len(others), 'error')} more" if others else ""
+        super().__init__(f"{first.message}{more}", file=first.file, line=first.line, column=first.column)
+        self.report = report
+
+
+def run(setup: str | Path, output: str | Path | None = None, *, check: bool = True) -> Outcome:
+    """Run the setup of a tool as OpenSim would, and write the files that it would write.
+
+    Args:
+        setup: the file.
+        output: a folder for all results, in place of where the setup puts them.
+        check: whether the setup and all that it names but the model are checked first.
+
+    Returns:
+        The tables that were written, as they were before they were rounded to the digits of the files, and a summary.
+
+    Raises:
+        FaultySetup: the check found errors.
+        UnsupportedError: the document is not of a tool that can be run.
+        OsimliteError: it could not be carried out; nothing is written then.
+    """
+    file = Path(setup)
+    top = read_any(file)
+    tag = type(top).__name__
+    if tag not in runnable():
+        raise NotRunnable(f"setups of {tag} cannot be run; those of {listed(runnable())} can", file=str(file))
+    if check and (report := merged(_reports(str(file)))).errors:
+        raise FaultySetup(report)
+    outcome = Outcome()
+    tool = import_module(f"{__package__}.{module_name(tag)}")
+    tool.run(Job(top, file, None if output is None else Path(output)), outcome)
+    outcome.write()
+    return outcome
+
+
+class NotRunnable(UnsupportedError):
+    """A document is not of a tool that can be run."""
+
+    exit_code = 2
+
+
+def runnable() -> list[str]:
+    """The names of the classes whose setups can be run."""
+    return [tag for tag in MODULES if tag.endswith("Tool") and _is_there(tag)]
+
+
+def _is_there(tag: str) -> bool:
+    return find_spec(f"{__package__}.{module_name(tag)}") is not None
+
+
+def _reports(file: str, passed: frozenset[str] = frozenset()) -> Iterator[Report]:
+    """What is wrong with a document and with the documents and tables that it names; models are left out."""
+    subject = subject_of(file, settings_of(file).config_for(file, Config()))
+    yield checked(subject, measure=False)
+    if isinstance(subject, Setup):
+        for naming in subject.named_files("file"):
+            path = Path(naming.path)
+            if naming.path in passed or not path.is_file() or not _is_checked(naming.path):
+                continue
+            yield from _reports(naming.path, passed | {file})
+
+
+def _is_checked(path: str) -> bool:
+    return is_table(path) or path.lower().endswith(".xml")

@@ -1,0 +1,102 @@
+"""Running setups of tools: what is refused, where files are looked for, and where results go."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("scipy", reason="needs scipy (extra 'sim')")
+
+import numpy as np
+
+import osimlite
+from osimlite.errors import OsimliteError
+from osimlite.simulation.files.storage import read_sto, write_sto
+from osimlite.tools.running import FaultySetup, NotRunnable
+from tests.cli.command import run
+
+SETUP = """<?xml version="1.0" encoding="UTF-8" ?>
+<OpenSimDocument Version="40600">
+    <InverseDynamicsTool name="id">
+        <results_directory>results</results_directory>
+        <model_file>walker.osim</model_file>
+        <time_range>0.02 0.1</time_range>
+        <coordinates_file>walk.mot</coordinates_file>
+        <output_gen_force_file>forces.sto</output_gen_force_file>
+    </InverseDynamicsTool>
+</OpenSimDocument>
+"""
+
+
+@pytest.fixture
+def setup(fixtures: Path, tmp_path: Path) -> Path:
+    """The setup of a tool that can be run, with its model and its motion."""
+    (tmp_path / "walker.osim").write_bytes((fixtures / "walker" / "DynamicWalkerModel.osim").read_bytes())
+    times = [0.01 * k for k in range(20)]
+    write_sto(tmp_path / "walk.mot", "walk", times, ("Pelvis_tx", "RKnee_rz"), [[t, 9 * t * t] for t in times])
+    (tmp_path / "setup.xml").write_text(SETUP)
+    return tmp_path / "setup.xml"
+
+
+def test_what_is_written_and_what_is_returned(setup: Path) -> None:
+    outcome = osimlite.run(setup)
+    (file,) = outcome.files
+    assert file == setup.parent / "results" / "forces.sto" and outcome.done
+    written, table = read_sto(file), outcome.tables["forces.sto"]
+    assert written.columns == table.columns
+    assert written.times.tolist() == pytest.approx([0.01 * k for k in range(2, 11)])
+    assert np.abs(written.rows - table.rows).max() <= 0.5e-8
+    lines = file.read_text().splitlines()
+    assert lines[:6] == [
+        "Inverse Dynamics Generalized Forces", "version=1", "nRows=9", f"nColumns={len(table.columns) + 1}",
+        "inDegrees=no", "endheader",
+    ]  # fmt: skip
+    assert lines[7].startswith("      0.02000000\t")
+
+
+def test_the_command_runs_from_anywhere_and_writes_where_it_is_told(setup: Path, tmp_path: Path) -> None:
+    away = tmp_path / "away"
+    away.mkdir()
+    for word in ("run", "run-tool"):
+        done = run(word, "../setup.xml", "-o", word, folder=away)
+        assert (done.code, done.err) == (0, "") and f"{word}/forces.sto" in done.out
+        assert [path.name for path in (away / word).iterdir()] == ["forces.sto"]
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_misspelt_name_is_told_with_its_line_and_nothing_is_written(setup: Path) -> None:
+    setup.write_text(SETUP.replace("walk.mot", "wlak.mot"))
+    with pytest.raises(FaultySetup, match=r"setup\.xml:7:.*'wlak\.mot'.* is not there") as caught:
+        osimlite.run(setup)
+    assert caught.value.report.errors
+    done = run("run", "setup.xml", folder=setup.parent)
+    assert done.code == 2 and "setup.xml:7:" in done.err and "OSIM821" in done.err
+    assert not (setup.parent / "results").exists()
+
+
+def test_what_a_setup_names_is_checked_too(setup: Path) -> None:
+    motion = setup.parent / "walk.mot"
+    motion.write_text(motion.read_text().replace("\n0.05\t", "\n0.04\t"))
+    with pytest.raises(OsimliteError, match=r"walk\.mot"):
+        osimlite.run(setup)
+    with pytest.raises(OsimliteError, match="sort the rows"):
+        osimlite.run(setup, check=False)
+
+
+@pytest.mark.parametrize("tag", ["CMCTool", "RRATool", "MocoStudy", "IKTaskSet", "Model"])
+def test_what_cannot_be_run_is_refused_by_name(setup: Path, tag: str) -> None:
+    setup.write_text(f'<OpenSimDocument Version="40600"><{tag} name="it"/></OpenSimDocument>')
+    with pytest.raises(NotRunnable, match=f"setups of {tag} cannot be run; those of .*InverseDynamicsTool"):
+        osimlite.run(setup)
+    assert run("run", "setup.xml", folder=setup.parent).code == 2
+
+
+def test_times_and_files_that_mean_nothing(setup: Path) -> None:
+    for old, new, said in (
+        ("0.02 0.1", "0.1 0.02", "give the first time first"),
+        ("walker.osim", "", "it names no model_file"),
+    ):
+        setup.write_text(SETUP.replace(old, new))
+        with pytest.raises(OsimliteError, match=said):
+            osimlite.run(setup, check=False)
