@@ -18,22 +18,22 @@ _NOTHING: Any = object()
 class _Field:
     """What `field` says of an attribute."""
 
-    __slots__ = "compare", "default", "default_factory", "init", "kw_only", "repr"
+    __slots__ = "choice", "compare", "default", "default_factory", "init", "kw_only", "repr"
 
     def __init__(
         self, default: Any, default_factory: Any = _NOTHING, *, init: bool = True, repr: bool = True,
-        compare: bool = True,
+        compare: bool = True, choice: Any = None,
     ) -> None:  # fmt: skip
         self.default, self.default_factory = default, default_factory
-        self.init, self.repr, self.compare, self.kw_only = init, repr, compare, False
+        self.init, self.repr, self.compare, self.kw_only, self.choice = init, repr, compare, False, choice
 
 
 def field(
     *, default: Any = _NOTHING, default_factory: Any = _NOTHING, init: bool = True, repr: bool = True,
-    compare: bool = True,
+    compare: bool = True, choice: Any = None,
 ) -> Any:  # fmt: skip
-    """As ``dataclasses.field``."""
-    return _Field(default, default_factory, init=init, repr=repr, compare=compare)
+    """As ``dataclasses.field``; `choice` is what else is said of the attribute, see :mod:`osimlite.choices`."""
+    return _Field(default, default_factory, init=init, repr=repr, compare=compare, choice=choice)
 
 
 def replace(item: T, /, **changes: Any) -> T:

@@ -78,7 +78,8 @@ class _Parameter(NamedTuple):
         if kind not in _NUMBERS or not _NUMBERS[kind].fullmatch(word):
             return None
         value = kind(word)
-        return None if value < self.declared.told.get("min", value) else value
+        told = self.declared.told
+        return value if told.get("min", value) <= value <= told.get("max", value) else None
 
 
 class Command:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from osimlite.cli._command import Argument, Option
 
 if TYPE_CHECKING:
+    from osimlite.choices import Choice
     from osimlite.document.printer import Numbers as NumberStyle
     from osimlite.multibody.mechanism import Mechanism
     from osimlite.schema.model import Model
@@ -37,24 +38,6 @@ Engine = Annotated[
     str,
     Option(help="What computes the accelerations: 'bullet', 'compiled', or 'auto': the first that is installed."),
 ]
-Accuracy = Annotated[float | None, Option(help="Of the integrator, as in OpenSim.", show_default="0.001")]
-Integrator = Annotated[
-    str | None,
-    Option(
-        show_default="merson",
-        help="'merson', whose steps are OpenSim's; 'adams' for smooth motion, as of few muscles; 'bdf' for stiff "
-        "motion, as of many; 'rosenbrock' for stiff motion at loose accuracy.",
-    ),
-]
-Wrapping = Annotated[
-    str,
-    Option(help="How paths bend around surfaces: 'opensim', as there; 'geodesic', smoothly, the shortest way."),
-]
-SkipUnsupported = Annotated[bool, Option("--skip-unsupported", help="Leave out forces that cannot be computed.")]
-ExternalLoads = Annotated[
-    Path | None,
-    Option(metavar="FILE", help="Measured forces that act too: a file of ExternalLoads.", show_default=False),
-]
 Lowpass = Annotated[
     float | None,
     Option(metavar="HZ", help="Filter the coordinates first, as OpenSim's tools do; 6 is usual.", show_default=False),
@@ -67,7 +50,6 @@ Foot = Annotated[
         show_default="the ends of the legs",
     ),
 ]
-Equilibrate = Annotated[bool, Option("--equilibrate", help="Start muscles in equilibrium of fibers and tendon.")]
 Controls = Annotated[
     list[str] | None,
     Option(
@@ -103,6 +85,18 @@ Geometry = Annotated[
 ]
 
 Browser = Annotated[bool, Option("--browser/--no-browser", help="Open the page in the browser.")]
+
+
+def simulating(*names: str) -> Callable[[], Iterator[Choice]]:
+    """The options of a simulation, or those of these names, for :func:`osimlite.cli._command.command_with`."""
+
+    def chosen() -> Iterator[Choice]:
+        from osimlite.choices import choices
+        from osimlite.simulation.options import Options
+
+        return (each for each in choices(Options) if not names or each.name in names)
+
+    return chosen
 
 
 def results_folder(file: Path, output: Path | None) -> Path:

@@ -61,6 +61,10 @@ Cluster = Annotated[
 ]
 
 
+PASSED = "accuracy", "integrator", "wrapping", "equilibrate", "skip_unsupported"
+"""Options of a simulation that those of many take too."""
+
+
 def make_plan(
     source: str,
     vary: Sequence[str] | None,

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
-from osimlite.cli._command import Option, command
+from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import Facts
 
 if TYPE_CHECKING:
     from osimlite.gait.gaits import Gait
 
 
-@command
+@command_with(options.simulating("skip_unsupported"))
 def find_gait(
     source: options.Source,
     vary: sweeping.Vary = None,
@@ -42,7 +42,8 @@ def find_gait(
         Path, Option("-o", "--output", metavar="FOLDER", help="For best.osim, cycles.csv, summary.json.")
     ] = Path("found"),
     force: Annotated[bool, Option("--force", help="Replace what another search found.")] = False,
-    skip_unsupported: options.SkipUnsupported = False,
+    *,
+    skip_unsupported: bool,
 ) -> None:
     """Look for the numbers of a model, and the start, with which a walker never stops; writes it, ready to walk.
 

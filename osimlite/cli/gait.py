@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from osimlite.cli import _options as options
-from osimlite.cli._command import Option, command
+from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import Facts
 from osimlite.cli._progress import progress_bar
 from osimlite.records import dataclass, field
@@ -26,7 +26,7 @@ WALK_ACCURACY = 1e-6
 """Of the integrator in the walk from the start; the step map takes its own."""
 
 
-@command
+@command_with(options.simulating("skip_unsupported"))
 def gait(
     source: options.Source,
     start: options.Start = None,
@@ -57,7 +57,8 @@ def gait(
         Option("-o", "--output", metavar="FOLDER", help="For gait.json, basin.csv, basin.png.", show_default=False),
     ] = None,
     parameter: options.Parameters = None,
-    skip_unsupported: options.SkipUnsupported = False,
+    *,
+    skip_unsupported: bool,
 ) -> None:
     """Count the steps of a walker, find the cycle that it walks in, and say whether that is stable.
 

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from osimlite.cli import _options as options
-from osimlite.cli._command import Option, command
+from osimlite.cli._command import Option, command_with
 
 
-@command
+@command_with(options.simulating("wrapping", "external_loads"))
 def inverse_dynamics(
     file: options.File,
     motion: options.Motion,
     output: options.Folder = None,
-    external_loads: options.ExternalLoads = None,
     lowpass: options.Lowpass = None,
-    wrapping: options.Wrapping = "opensim",
     exclude: Annotated[
         list[str] | None,
         Option(
@@ -24,6 +22,7 @@ def inverse_dynamics(
             show_default=False,
         ),
     ] = None,
+    **chosen: Any,
 ) -> None:
     """Find the forces of a recorded motion: writes inverse_dynamics.sto.
 
@@ -41,8 +40,6 @@ def inverse_dynamics(
     model = read(file)
     recorded = opened(model, motion, lowpass)
     exclude_forces(model, exclude or ["Muscles"])
-    forces = force_elements(
-        model, recorded.mechanism, wrapping=wrapping, external_loads=external_loads, folder=file.parent
-    )
+    forces = force_elements(model, recorded.mechanism, folder=file.parent, **chosen)
     tables = {"inverse_dynamics.sto": recorded.inverse_dynamics(forces)}
     written(recorded, tables, options.results_folder(file, output))

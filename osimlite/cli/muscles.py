@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from osimlite.cli import _options as options
-from osimlite.cli._command import Option, command
+from osimlite.cli._command import Option, command_with
 
 if TYPE_CHECKING:
     from osimlite.multibody.mechanism import Mechanism
     from osimlite.simulation.muscle_curves import MuscleCurves
 
 
-@command
+@command_with(options.simulating("wrapping"))
 def muscles(
     file: options.File,
     coordinate: Annotated[
@@ -37,7 +37,6 @@ def muscles(
         Option(min=2, help="How many values of each coordinate.", show_default="50, of two coordinates 15"),
     ] = None,
     activation: Annotated[float, Option(help="Of all muscles, 0 to 1.")] = 1.0,
-    wrapping: options.Wrapping = "opensim",
     compare: Annotated[
         Path | None,
         Option(metavar="FILE", help="Another model, side by side: scaled, or converted.", show_default=False),
@@ -49,6 +48,8 @@ def muscles(
             "-o", "--output", metavar="FILE", help="Write all numbers: .csv or .parquet, SI units.", show_default=False
         ),
     ] = None,
+    *,
+    wrapping: str,
 ) -> None:
     """Tell lengths, moment arms, fiber lengths and forces of muscles over a coordinate, as OpenSim's plotter does.
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
-from osimlite.cli._command import Option, command
+from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import Facts
 
 if TYPE_CHECKING:
     from osimlite.sweep.optimize import Optimum
 
 
-@command
+@command_with(options.simulating(*sweeping.PASSED))
 def optimize(
     source: options.Source,
     objective: Annotated[
@@ -60,9 +60,6 @@ def optimize(
     ] = None,
     to: options.To = 2.0,
     engine: options.Engine = "compiled",
-    accuracy: options.Accuracy = None,
-    integrator: options.Integrator = None,
-    wrapping: options.Wrapping = "opensim",
     stop_below: sweeping.Below = None,
     stop_above: sweeping.Above = None,
     planted: sweeping.Planted = False,
@@ -78,8 +75,7 @@ def optimize(
     force: Annotated[bool, Option("--force", help="Replace what another search found.")] = False,
     controls: options.Controls = None,
     interpolation: sweeping.Interpolation = "linear",
-    equilibrate: options.Equilibrate = False,
-    skip_unsupported: options.SkipUnsupported = False,
+    **chosen: Any,
 ) -> None:
     """Look for the start, the controls or other numbers with which a model does best; writes it with them.
 
@@ -93,10 +89,9 @@ def optimize(
     from osimlite.sweep.optimize import optimize as search
 
     plan = sweeping.make_plan(
-        source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure or ()), to=to, engine=engine,
-        accuracy=accuracy, report_interval=report_interval, integrator=integrator, wrapping=wrapping,
-        interpolation=interpolation, is_planted=planted,
-        feet=tuple(foot) if foot else None, equilibrate=equilibrate, skip_unsupported=skip_unsupported,
+        source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure or ()), to=to,
+        engine=engine, report_interval=report_interval, interpolation=interpolation, is_planted=planted,
+        feet=tuple(foot) if foot else None, **chosen,
     )  # fmt: skip
     with progress_bar("searching", budget) as progress:
         found = search(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from osimlite.cli import _options as options
-from osimlite.cli._command import Option, command
+from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import Facts, complain
 from osimlite.cli._progress import motion_bar, progress_bar
 
@@ -18,20 +18,13 @@ LIVE_STEP = 1e-3
 """Step of what the window shows if none is given, s."""
 
 
-@command
+@command_with(options.simulating())
 def simulate(
     file: options.File,
     to: options.To = 2.0,
     engine: options.Engine = "auto",
-    accuracy: options.Accuracy = None,
-    integrator: options.Integrator = None,
-    fixed_step: Annotated[
-        float | None,
-        Option(metavar="SECONDS", help="Steps of this length (semi-implicit Euler), without error control."),
-    ] = None,
     start: options.Start = None,
     start_speed: options.StartSpeed = None,
-    equilibrate: options.Equilibrate = False,
     controls: options.Controls = None,
     states: Annotated[
         Path | None,
@@ -39,9 +32,6 @@ def simulate(
             metavar="FILE", help="Start from the last row of a file of states; --set says more.", show_default=False
         ),
     ] = None,
-    report_interval: Annotated[
-        float, Option(metavar="SECONDS", help="Time between the rows of the result files.")
-    ] = 0.01,
     output: options.Folder = None,
     plot: Annotated[
         bool, Option("--plot", help="Draw coordinates, muscles, forces, probes and energy as PNG.")
@@ -55,16 +45,7 @@ def simulate(
             "fixed steps.",
         ),
     ] = False,
-    wrapping: options.Wrapping = "opensim",
-    skip_unsupported: options.SkipUnsupported = False,
-    opensim_derivatives: Annotated[
-        bool,
-        Option("--opensim-derivatives", help="Repeat OpenSim's mistakes in joints with several turns."),
-    ] = False,
-    rolling: Annotated[
-        bool, Option("--rolling", help="Let rolling constraints act, which OpenSim leaves off.")
-    ] = False,
-    external_loads: options.ExternalLoads = None,
+    **chosen: Any,
 ) -> None:
     """Simulate a model forward in time, from its default pose: writes states.sto, forces.sto and summary.json.
 
@@ -92,13 +73,9 @@ def simulate(
     with Simulation(
         model,
         engine,
-        wrapping=wrapping,
-        skip_unsupported=skip_unsupported,
-        opensim_derivatives=opensim_derivatives,
-        rolling=rolling,
-        external_loads=external_loads,
         folder=file.parent,
         show=gui,
+        **chosen,
     ) as simulation:
         initial = {} if states is None else simulation.state_in(states)
         initial |= options.quantities(start, simulation.mechanism, "--set", simulation.state.paths)
@@ -108,13 +85,9 @@ def simulate(
             with motion_bar("simulating", to) as progress:
                 trajectory = simulation.run(
                     to,
-                    accuracy=accuracy,
-                    integrator=integrator,
-                    fixed_step=LIVE_STEP if gui and fixed_step is None else fixed_step,
-                    report_interval=report_interval,
+                    fixed_step=LIVE_STEP if gui and chosen["fixed_step"] is None else chosen["fixed_step"],
                     initial=initial,
                     initial_speeds=speeds,
-                    equilibrate=equilibrate,
                     controls=words_to_controls(controls) if controls else None,
                     progress=progress,
                 )
@@ -136,6 +109,7 @@ def simulate(
 
             folders = options.mesh_folders(file, None)
             with progress_bar("drawing", None) as bar:
+                wrapping = chosen["wrapping"]
                 return draw(model, trajectory, path, folders=folders, file=file, wrapping=wrapping, progress=bar)
 
         files = _write(trajectory, results, plot=plot, film=film if animate else None)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
-from osimlite.cli._command import Option, command
+from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import Facts, complain
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from osimlite.sweep.run import Outcome
 
 
-@command
+@command_with(options.simulating(*sweeping.PASSED))
 def sweep(
     source: options.Source,
     vary: sweeping.Vary = None,
@@ -40,9 +40,6 @@ def sweep(
     ] = None,
     to: options.To = 2.0,
     engine: options.Engine = "compiled",
-    accuracy: options.Accuracy = None,
-    integrator: options.Integrator = None,
-    wrapping: options.Wrapping = "opensim",
     stop_below: sweeping.Below = None,
     stop_above: sweeping.Above = None,
     planted: sweeping.Planted = False,
@@ -58,8 +55,7 @@ def sweep(
     force: Annotated[bool, Option("--force", help="Replace results that were made with other settings.")] = False,
     controls: options.Controls = None,
     interpolation: sweeping.Interpolation = "linear",
-    equilibrate: options.Equilibrate = False,
-    skip_unsupported: options.SkipUnsupported = False,
+    **chosen: Any,
 ) -> None:
     """Simulate a model from many starts, or with many values of its numbers: one row of the results for each run.
 
@@ -72,16 +68,14 @@ def sweep(
     from osimlite.sweep.sampling import samples as choose
 
     plan = sweeping.make_plan(
-        source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure) if measure else None, to=to,
-        engine=engine, accuracy=accuracy, report_interval=report_interval, integrator=integrator, wrapping=wrapping,
-        interpolation=interpolation,
-        is_planted=planted, feet=tuple(foot) if foot else None, equilibrate=equilibrate,
-        skip_unsupported=skip_unsupported,
+        source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure) if measure else None,
+        to=to, engine=engine, report_interval=report_interval, interpolation=interpolation, is_planted=planted,
+        feet=tuple(foot) if foot else None, **chosen,
     )  # fmt: skip
-    chosen = choose(plan.variables, sampler, samples, seed)
-    with progress_bar("sweeping", chosen.count) as progress:
+    points = choose(plan.variables, sampler, samples, seed)
+    with progress_bar("sweeping", points.count) as progress:
         outcome = run(
-            plan, chosen, output, resume=resume, force=force, workers=workers, cluster=cluster, progress=progress
+            plan, points, output, resume=resume, force=force, workers=workers, cluster=cluster, progress=progress
         )
     _told(plan, outcome).show()
     if outcome.status["failed"] == outcome.count:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 
 def _choices() -> Iterator[Choice]:
+    yield from options.simulating("wrapping")()
     for name, exporter in exporters("view").items():
         yield Choice(name, Path | None, exporter.help, unit="FILE")
         yield from exporter.choices
@@ -37,10 +38,11 @@ def view(
             show_default="computed, if the motion has speeds",
         ),
     ] = None,
-    wrapping: options.Wrapping = "opensim",
     geometry: options.Geometry = None,
     port: Annotated[int, Option(help="Serve the page at this port.", show_default="any that is free")] = 0,
     browser: options.Browser = True,
+    *,
+    wrapping: str,
     **chosen: Any,
 ) -> None:
     """Look at a model, and at a motion: bodies, contacts, muscles, the component tree, a slider for every coordinate.

@@ -1,0 +1,88 @@
+"""Words are read here as typer reads them, or left to it."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from osimlite.choices import choices
+from osimlite.cli import COMMANDS, app
+from osimlite.cli._command import Command
+from osimlite.simulation.options import Options
+
+WORDS = [
+    "walker.osim", "b.osim", "-", "1", "0", "-1", "2.5", "1e-6", ".5", "5.", "1_0", "inf", "nan", "x", "a=1", "a==", "",
+    "--", "-p", "-o", "-ofolder", "-o=x", "--output", "--no", "--help", "é", "٣",
+]  # fmt: skip
+
+
+def loaded(name: str) -> Command:
+    function = name.replace("-", "_")
+    command: Command = getattr(import_module(f"osimlite.cli.{function}"), function)
+    return command
+
+
+def by_typer(name: str, words: list[str], monkeypatch: pytest.MonkeyPatch) -> dict[str, Any] | None:
+    """What typer gives the function; None if it refuses the words, or shows the help."""
+    seen: list[dict[str, Any]] = []
+    with monkeypatch.context() as patch:
+        patch.setattr(Command, "__call__", lambda self, **values: seen.append(values))
+        try:
+            app([name])(args=[name, *words], standalone_mode=False)
+        except Exception as error:
+            assert hasattr(error, "format_message"), error
+    return seen[0] if seen else None
+
+
+def spellings(name: str) -> list[str]:
+    return [word for each in loaded(name).parameters() for word in each.spellings if each.declared.maker == "Option"]
+
+
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+@pytest.mark.parametrize("name", ["simulate", "validate", "translate", "view", "find-gait", "gait", "diff", "build"])
+def test_what_is_read_is_what_typer_reads(name: str, data: st.DataObject) -> None:
+    word = st.sampled_from(WORDS)
+    option = st.sampled_from(spellings(name))
+    part = st.one_of(
+        st.tuples(word), st.tuples(option), st.tuples(option, word),
+        st.builds(lambda left, right: (f"{left}={right}",), option, word),
+    )  # fmt: skip
+    words = ["walker.osim", *(each for few in data.draw(st.lists(part, max_size=5)) for each in few)]
+    found = loaded(name).read(words)
+    if found is not None:
+        assert found == by_typer(name, words, pytest.MonkeyPatch()), words
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_defaults_are_those_of_typer(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    needed = [each for each in loaded(name).parameters() if each.default is ...]
+    words = [f for each in needed for f in ("x",) if each.declared.maker == "Argument"]
+    words += [f for each in needed if each.declared.maker == "Option" for f in (next(iter(each.spellings)), "x")]
+    found = loaded(name).read(words)
+    assert found is not None and found == by_typer(name, words, monkeypatch)
+
+
+def test_what_is_wrong_is_left_to_typer() -> None:
+    read = loaded("simulate").read
+    assert read(["a.osim", "--to", "2", "--plot"]) is not None
+    for wrong in ([], ["a", "b"], ["a", "--two"], ["a", "--to"], ["a", "--to", "x"], ["a", "--plot=1"], ["--help"]):
+        assert read(wrong) is None
+    assert loaded("find-gait").read(["a", "--digits", "18"]) is None
+    assert loaded("find-gait").read(["a", "--digits", "17"]) is not None
+
+
+def test_an_option_of_a_simulation_is_declared_once() -> None:
+    taken = {each.name: each for each in loaded("simulate").parameters()}
+    for choice in choices(Options):
+        assert taken[choice.name].default == getattr(Options(), choice.name) == choice.default
+        assert f"{choice.name}: {choice.help.split()[0]}" in (Options.__doc__ or "")
+    for name in ("sweep", "optimize", "gait", "muscles"):
+        for each in loaded(name).parameters():
+            same = taken.get(each.name)
+            if same is not None and each.name in ("wrapping", "skip_unsupported", "integrator", "equilibrate"):
+                assert each.declared.told == same.declared.told and each.default == same.default
