@@ -48,7 +48,8 @@ class Facts(NamedTuple):
         missing: likewise without a number where there is no default.
         doubts: by property, what is doubtful about a number outside its domain that OpenSim computes with.
         mujoco: of a muscle, the properties that numbers of MuJoCo's muscle are read from, by MuJoCo's names (vmax,
-            fvmax); a dot leads into the object that a property holds. What is not named here its base has.
+            fvmax) or rise and fall, the time constants; a dot leads into the object that a property holds. What is not
+            named here its base has.
         scales: by property, what it is multiplied by when the model is scaled: by the factors of a body along its axes,
             of which the word says whose they are (OWN the frame itself, HOLDER the frame that holds the object, or the
             socket that leads to a frame, or the coordinate of whose joint it is the parent frame), and a word behind it

@@ -56,6 +56,8 @@ class Muscle(PathActuator, abstract=True):
         mujoco={
             "vmax": "max_contraction_velocity",
             "fvmax": "force_velocity_curve.max_eccentric_velocity_force_multiplier",
+            "rise": "activation_time_constant",
+            "fall": "deactivation_time_constant",
         },
         scales={"optimal_fiber_length": PATH, "tendon_slack_length": PATH},
     )
@@ -238,7 +240,13 @@ def _full_activation(least: float) -> Iterator[Contradiction]:
 class Millard2012AccelerationMuscle(Muscle):
     """The muscle of Millard et al. (2013) with a mass between fiber and tendon, whose place and speed are states."""
 
-    facts = Facts(states="activation fiber_length fiber_velocity")
+    facts = Facts(
+        states="activation fiber_length fiber_velocity",
+        mujoco={
+            "rise": "muscle_first_order_activation_dynamic_model.activation_time_constant",
+            "fall": "muscle_first_order_activation_dynamic_model.deactivation_time_constant",
+        },
+    )
 
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.0
     """Activation at the start of a simulation."""

@@ -23,7 +23,7 @@ class StraightMuscle(Muscle):
         refused="width",
         zero={NAN: "rise_time"},
         doubts={"grip": "lengthening fibers bear less than at rest"},
-        mujoco={"fvmax": "grip", "vmax": "fastest"},
+        mujoco={"fvmax": "grip", "vmax": "fastest", "rise": "rise_time", "fall": "rise_time"},
     )
 
     default_activation: Annotated[float, real(domain="0 to 1")] = 0.05

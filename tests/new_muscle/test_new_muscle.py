@@ -123,6 +123,7 @@ def test_mujoco_has_it(file):
     actuator = compiled.actuator("biceps")
     # Least squares fit the curves; strength, vmax and fvmax are the model's.
     assert (actuator.gainprm[2], actuator.gainprm[6], actuator.gainprm[8]) == pytest.approx((100.0, 10.0, 1.2))
+    assert actuator.dynprm[:2].tolist() == [0.02, 0.02]
     assert mjcf.fidelity.translated["/forceset/biceps"] == "actuator biceps"
 
 

@@ -23,6 +23,7 @@ from osimlite._require import require
 from osimlite.errors import OsimliteError
 from osimlite.multibody.spatial import Array
 from osimlite.schema.muscles import Muscle
+from osimlite.schema.states import states_of
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.draft import Draft, Unsayable, add, tidy
 from osimlite.translate.mjcf.isometric import isometric_tension
@@ -120,9 +121,9 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
         raise Unsayable(f"its tension cannot be computed: {error.message}") from error
     curves = _fitted(own, spread[0], tensions, free=fits)
     name, limits = draft.name("actuator", path), (max(force.min_control, 0.0), min(force.max_control, 1.0))
-    rise, fall = (getattr(force, f"{word}_time_constant", 0.0) for word in ("activation", "deactivation"))
-    lags = rise > 0.0 and fall > 0.0 and not force.ignore_activation_dynamics
-    gain, bias = curves.numbers(*_rates(force, cos))
+    rise, fall = _asked(force, "rise", 0.0), _asked(force, "fall", 0.0)
+    lags = rise > 0.0 and fall > 0.0 and "activation" in states_of(force)
+    gain, bias = curves.numbers(_asked(force, "vmax", 0.0) / cos**2, _asked(force, "fvmax", FVMAX))
     add(
         draft.section("actuator"),
         "general",
@@ -158,17 +159,13 @@ def _counts(tensions: Array, own: Curves) -> NDArray[np.bool_]:
     return np.nan_to_num(tensions, nan=np.inf) < MOST * own.force
 
 
-def _rates(force: Muscle, cos: float) -> tuple[float, float]:
-    """MuJoCo's vmax, which is measured along the tendon, and fvmax."""
+def _asked(force: Muscle, name: str, default: float) -> float:
+    """What MuJoCo asks of a muscle, from the property that its class names."""
     named = ChainMap(*(base.__dict__["facts"].mujoco for base in type(force).__mro__ if "facts" in base.__dict__))
-    return attrgetter(named["vmax"])(force) / cos**2, _strongest(force, named["fvmax"])
-
-
-def _strongest(force: Muscle, name: str) -> float:
     try:
-        return float(attrgetter(name)(force))
+        return float(attrgetter(named[name])(force))
     except AttributeError:
-        return FVMAX
+        return default
 
 
 def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curves:

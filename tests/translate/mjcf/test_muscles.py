@@ -82,3 +82,16 @@ def test_a_slack_spring_pulls_nothing(corpus):
         mujoco.mj_forward(compiled, data)
         expected = isometric_tension(model["/forceset/cord"], np.array([0.3 + stretch]), (0.0,))
         assert -data.qfrc_spring[compiled.joint("pelvis_tx").dofadr[0]] == pytest.approx(expected.item(), abs=1e-9)
+
+
+def test_the_activation_of_a_muscle_with_a_mass_lags_too(corpus):
+    old = gait(corpus)["/forceset/soleus_r"]
+    muscle = osimlite.Millard2012AccelerationMuscle(name="soleus_r", max_isometric_force=old.max_isometric_force)
+    muscle.optimal_fiber_length, muscle.tendon_slack_length = old.optimal_fiber_length, old.tendon_slack_length
+    muscle.muscle_first_order_activation_dynamic_model.activation_time_constant = 0.012
+    muscle.geometry_path = old.geometry_path.copy_deep()
+    model = gait(corpus)
+    forces = model.force_set.objects
+    forces[[force.name for force in forces].index("soleus_r")] = muscle
+    compiled = mujoco.MjModel.from_xml_string(to_mjcf(model, visuals=False).text)
+    assert compiled.actuator("soleus_r").dynprm[:2].tolist() == [0.012, 0.04]
