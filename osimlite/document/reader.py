@@ -23,10 +23,11 @@ from osimlite.document.syntax import expect_plain_doctype, place_of, plain_words
 from osimlite.errors import DocumentError, MissingFileError, NotWellFormedError, SpecialFileError, VersionError
 from osimlite.files import TABLES, expect_size
 from osimlite.records import dataclass, field
-from osimlite.schema.base import Object
+from osimlite.schema.base import Object, put_index
 from osimlite.schema.layout import Include, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model
 from osimlite.schema.registry import class_for, tags
+from osimlite.schema.specs import holding
 from osimlite.text import nearest
 
 if TYPE_CHECKING:
@@ -210,10 +211,14 @@ def _renumber(source: Source, top: Object, notes: list[Note], upgraded: Upgraded
     numbers = upgraded.numbers
     if numbers is None:
         return notes
-    for each in (top, *layout_of(top).defaults):
-        for item in each.walk():
-            if item._index is not None:
-                object.__setattr__(item, "_index", numbers[item._index])
+    # What no one has asked for yet has no place; to ask for it here would make it.
+    items: list[Object] = [top, *layout_of(top).defaults]
+    for item in items:
+        if item._index is not None:
+            put_index(item, numbers[item._index])
+        for _, name, *_ in holding(type(item)):
+            held = item.__dict__.get(name)
+            items += held if isinstance(held, list) else [] if held is None else [held]
     return [note._replace(number=numbers[note.number]) for note in notes]
 
 
@@ -394,12 +399,13 @@ def _included_by(source: Source, around: tuple[str, ...] = (), read: list[int] |
     is being read already, leaves the object as it is. `around` are the files that are being read, `read` is how many
     bytes have been read of files so far: a few that name each other often enough would never end.
     """
-    if source.file is None:
+    around_it = source.file
+    if around_it is None:
         return None
-    folder, total = Path(source.file).parent, [0] if read is None else read
+    total = [0] if read is None else read
 
     def included(file: str, cls: type[Object]) -> tuple[Object, Include, list[Note]] | str:
-        place = folder / file
+        place = Path(around_it).parent / file
         path = os.path.realpath(place)
         if path in around:
             return "is being read already"

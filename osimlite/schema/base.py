@@ -125,7 +125,7 @@ class Object(BaseModel, metaclass=ObjectType):
         _put_extra(self, None)
         _put_private(self, None)
         put_model(self, home)
-        _put_index(self, index)
+        put_index(self, index)
         _put_layout(self, None)
         return self
 
@@ -250,7 +250,7 @@ _put_state, _put_present, _put_extra, _put_private = (
     BaseModel.__dict__[name].__set__
     for name in ("__dict__", "__pydantic_fields_set__", "__pydantic_extra__", "__pydantic_private__")
 )
-put_model, _put_index, _put_layout = (Object.__dict__[name].__set__ for name in _SLOTS)
+put_model, put_index, _put_layout = (Object.__dict__[name].__set__ for name in _SLOTS)
 
 
 class Component(Object, abstract=True):

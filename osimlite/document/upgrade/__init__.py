@@ -7,6 +7,7 @@ rounding of numbers to six digits and without the references it breaks.
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 
@@ -22,11 +23,16 @@ __all__ = ["Change", "Refusal", "Refused", "Step", "Upgraded", "steps", "upgrade
 
 def steps(version: int = 0) -> list[Step]:
     """The steps that a document of this version needs, oldest first."""
-    needed = "v" if version < 40000 else "v4"
+    return [step for step in _steps_of("v" if version < 40000 else "v4") if version < step.below]
+
+
+@cache
+def _steps_of(prefix: str) -> list[Step]:
+    """The steps of the modules whose name begins so, oldest first."""
     for module in iter_modules(__path__):
-        if module.name.startswith(needed):
+        if module.name.startswith(prefix):
             import_module(f"{__name__}.{module.name}")
-    return sorted((step for step in REGISTERED if version < step.below), key=lambda step: step.order)
+    return sorted(REGISTERED, key=lambda step: step.order)
 
 
 class Upgraded:

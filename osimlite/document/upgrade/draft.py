@@ -139,8 +139,17 @@ class Draft:
         return {element: number for number, element in enumerate(self.root.iter(etree.Element))}
 
     @cached_property
-    def _tags(self) -> set[str]:
-        return {element.tag for element in self.numbers}
+    def _tags(self) -> dict[str, set[str]]:
+        """Every tag that there is or was, by the families of its class."""
+        found: dict[str, set[str]] = {}
+        for tag in {element.tag for element in self.numbers}:
+            for family in families(tag):
+                found.setdefault(family, set()).add(tag)
+        return found
+
+    def _know(self, tag: str) -> None:
+        for family in families(tag):
+            self._tags.setdefault(family, set()).add(tag)
 
     @property
     def changes(self) -> list[Change]:
@@ -168,9 +177,8 @@ class Draft:
 
         Objects of unknown classes count as what the set they stand in says.
         """
-        wanted = frozenset(kinds)
-        tags = [tag for tag in self._tags if wanted & families(tag)]
-        sets = {owner for owner, kind in _FAMILY_OF_MEMBERS.items() if kind in wanted} & self._tags
+        tags = {tag for kind in kinds for tag in self._tags.get(kind, ())}
+        sets = [owner for owner, kind in _FAMILY_OF_MEMBERS.items() if kind in kinds and owner in self._tags]
         found = list(self.root.iter(*tags)) if tags else []
         if sets:
             strange = [
@@ -193,14 +201,14 @@ class Draft:
         if name is not None:
             made.set("name", name)
         self.numbers[made] = self.numbers[source]
-        self._tags.add(tag)
+        self._know(tag)
         self.touched[made] = None
         return made
 
     def rename(self, element: Element, tag: str) -> None:
         """Give an element another tag."""
         element.tag = tag
-        self._tags.add(tag)
+        self._know(tag)
         self.touched[element] = None
 
     def move(self, element: Element, parent: Element) -> None:

@@ -333,3 +333,9 @@ def test_actuators_without_a_version_push_backwards_as_in_opensim() -> None:
     given, bare, torque, about = top.objects
     assert (given.direction, given.force_is_global) == ((0.0, -2.0, 0.0), False)
     assert (bare.direction, torque.axis, about.axis) == ((-1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, -1.0))
+
+
+def test_modules_of_steps_are_looked_for_once(monkeypatch):
+    first = steps(40000), steps(20000)
+    monkeypatch.setattr("osimlite.document.upgrade.iter_modules", None)
+    assert (steps(40000), steps(20000)) == first
