@@ -131,6 +131,8 @@ class Options:
 
     def changed(self, choices: Mapping[str, Any]) -> Options:
         """With other choices; errors as those of `of`."""
+        if not choices:
+            return self
         known = [*vars(self)]
         for name in choices:
             if name not in known:

@@ -7,11 +7,14 @@ import weakref
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import osimlite
 from osimlite.simulation import run
+from osimlite.simulation.engines.batch import Batch
+from osimlite.simulation.engines.linking import has_compiler
 
 WALKER = "fixtures/walker/DynamicWalkerModel.osim"
 
@@ -149,3 +152,20 @@ def test_threads_do_not_meet_in_one_model(repo):
     with ThreadPoolExecutor(4) as pool:
         for (values, energy), (mine, own) in zip(pool.map(motion, starts), alone, strict=True):
             assert np.array_equal(values, mine) and np.array_equal(energy, own)
+
+
+@pytest.mark.skipif(not has_compiler(), reason="as Python the kernels take the time of many calls")
+def test_a_model_that_has_moved_moves_in_one_call(repo, monkeypatch):
+    calls = []
+    whole = Batch.run
+    monkeypatch.setattr(Batch, "run", lambda self, *rest: (calls.append(1), whole(self, *rest))[1])
+    model = osimlite.read(repo / WALKER)
+    first = osimlite.simulate(model, to=1.0, engine="compiled")
+    at_first = len(calls)
+    osimlite.simulate(model, to=1.0, engine="compiled")
+    calls.clear()
+    last = osimlite.simulate(model, to=1.0, engine="compiled")
+    # Unless the machine stood still for a moment, one; in any case fewer than before anything was known.
+    assert len(calls) < at_first
+    assert np.array_equal(first.values, last.values)
+    assert first.summary["contact_events"] == last.summary["contact_events"]

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from math import inf, isfinite
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NoReturn
+from weakref import WeakKeyDictionary
 
 from osimlite.errors import SettingError, SimulationError
 from osimlite.simulation.engines.batch import Batch
@@ -21,10 +22,13 @@ if TYPE_CHECKING:
     from osimlite.simulation.engines.base import KernelEngine
 
 FIRST_STEPS, LOGGED_STEPS = 8, 512
-"""So many steps are taken in the first call of a motion that is watched, and in any other at most."""
+"""So many steps are taken in the first call of an engine's first motion, and in any other at most."""
 
 CALL_SECONDS = 0.1
 """About so long a call may take: nothing is told, and Ctrl-C is not heard, before it ends."""
+
+_at_once: WeakKeyDictionary[KernelEngine, int] = WeakKeyDictionary()
+"""So many steps the next call of an engine takes, as the last one went."""
 
 
 class ControlledSteps(Stepper):
@@ -139,11 +143,13 @@ class ControlledSteps(Stepper):
 
     def _calls(self, batch: Batch) -> Iterator[float]:
         """Take steps until the last report is made; yields the mean length of the steps of each call, s."""
-        ending, steps = record.FULL, FIRST_STEPS
+        ending, engine = record.FULL, self._engine
         while ending == record.FULL:
-            started, before, taken = perf_counter(), self.time, self.taken
+            started, before, taken, steps = perf_counter(), self.time, self.taken, _at_once.get(engine, FIRST_STEPS)
             ending = self._call(batch, steps)
-            steps = min(max(1, int(steps * min(8.0, CALL_SECONDS / (perf_counter() - started)))), LOGGED_STEPS)
+            # As many as the time allows, but not many more than were tried.
+            more = min(8.0 * steps, (self.taken - taken) * CALL_SECONDS / (perf_counter() - started))
+            _at_once[engine] = min(max(1, int(more)), LOGGED_STEPS)
             yield (self.time - before) / max(self.taken - taken, 1)
 
     def _call(self, batch: Batch, steps: int) -> int:
