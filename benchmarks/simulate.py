@@ -2,13 +2,12 @@
 
 Warm: the model is read and made ready once; what is timed is the motion alone, from the default pose, in processor
 time. Both integrate with Runge-Kutta-Merson, OpenSim records its states at every step, osimlite every 10 ms. Whole
-process: a new Python that imports, reads the file, simulates, and ends. The error is the largest difference of any
-coordinate (rad or m) from the converged motion, at t = 2 s.
+processes are in all.py. The error is the largest difference of any coordinate (rad or m) from the converged motion, at
+t = 2 s.
 """
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -19,7 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
-from _pair import pair, pair_commands, report
+from _pair import pair, report
 from osimlite.simulation import Simulation
 
 MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
@@ -29,7 +28,6 @@ CONVERGED = 1e-10
 ROUNDS, WARM_UP = 15, 2
 
 ENGINES = {"PyBullet": "bullet", "compiled": "compiled"}
-OURS = "import osimlite; osimlite.simulate(osimlite.read({model!r}), to={to}, accuracy={accuracy}, engine={engine!r})"
 THEIRS = """
 import opensim
 opensim.Logger.setLevelString("off")
@@ -64,15 +62,7 @@ def main() -> None:
     for simulation in simulations.values():
         simulation.close()
     console.print(errors)
-    whole = []
-    for accuracy in ACCURACIES[:2]:
-        for name, engine in ENGINES.items():
-            words = {"model": str(MODEL), "to": TO, "accuracy": accuracy, "engine": engine}
-            commands = [[sys.executable, "-c", text.format(**words)] for text in (OURS, THEIRS)]
-            title = f"whole process, {name}, {accuracy:g}"
-            whole.append(pair_commands(title, ours=commands[0], theirs=commands[1], rounds=9))
     report(f"Dynamic Walker, {TO:g} s, warm, by accuracy", warm, console=console)
-    report("Whole processes (machine code in the cache)", whole, console=console)
 
 
 def run_ours(simulation: Simulation, accuracy: float, to: float = TO) -> Callable[[], list[float]]:

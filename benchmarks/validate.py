@@ -2,9 +2,9 @@
 
     python benchmarks/validate.py [FOLDER] [--rounds N] [--files N] [--each]
 
-Three tables: whole processes, as a user starts them; read-and-validate within one process for every real model that
-OpenSim initializes (FOLDER holds `.osim` or `.osim.gz` files; without one the shared corpus is used); and a folder of
-many models, first unknown and then unchanged. OpenSim says nothing about most faults; it is timed as the only check
+Two tables: read-and-validate within one process for every real model that OpenSim initializes (FOLDER holds `.osim` or
+`.osim.gz` files; without one the shared corpus is used); and a folder of many models, first unknown and then unchanged.
+Whole processes are in all.py. OpenSim says nothing about most faults; it is timed as the only check
 there is without osimlite. Findings kept from earlier runs are used in the last table alone.
 """
 
@@ -23,7 +23,7 @@ from rich.console import Console
 from rich.table import Table
 
 from _corpus import CORPUS, unpacked
-from _pair import Pair, pair, pair_commands, report
+from _pair import Pair, pair, report
 
 ROOT = Path(__file__).resolve().parents[1]
 WALKER = ROOT / "fixtures" / "walker" / "DynamicWalkerModel.osim"
@@ -35,17 +35,17 @@ model.initSystem()
 """
 
 
-def whole_processes(rounds: int, models: list[Path]) -> None:
-    rows = []
+def whole_process(*words: str) -> list[str]:
+    """The command, as a user calls it."""
     script = Path(sys.executable).with_name("osimlite")
-    command = [str(script)] if script.exists() else [sys.executable, "-m", "osimlite"]
-    for model in models:
-        theirs = [sys.executable, "-c", THEIRS.format(model=str(model))]
-        ours = [*command, "validate", "--no-cache", str(model)]
-        rows.append(pair_commands(f"{model.stem}, first run", ours=ours, theirs=theirs, rounds=rounds))
-    ours = [*command, "validate", str(models[0])]
-    rows.append(pair_commands(f"{models[0].stem}, unchanged", ours=ours, theirs=theirs, rounds=rounds))
-    report("Whole processes: osimlite validate FILE", rows)
+    return [*([str(script)] if script.exists() else [sys.executable, "-m", "osimlite"]), *words]
+
+
+def initialized(path: Path) -> None:
+    """What OpenSim does with a model before anything moves."""
+    import opensim
+
+    opensim.Model(str(path)).initSystem()
 
 
 def in_process(rounds: int, files: list[Path], each: bool) -> None:
@@ -54,9 +54,6 @@ def in_process(rounds: int, files: list[Path], each: bool) -> None:
     import osimlite
 
     opensim.Logger.setLevelString("off")
-
-    def initialized(path: Path) -> None:
-        opensim.Model(str(path)).initSystem()
 
     rows: list[tuple[Pair, int]] = []
     for path in files:
@@ -125,7 +122,6 @@ def main() -> None:
         import opensim  # noqa: F401
     except ImportError:
         sys.exit("this benchmark compares with OpenSim; install it with: pip install -e '.[oracle]'")
-    whole_processes(options.rounds, [WALKER])
     with tempfile.TemporaryDirectory() as place:
         files = unpacked(options.folder, Path(place)) if options.folder.is_dir() else []
         if files:
