@@ -318,6 +318,7 @@ class Simulation:
         """
         own = {path: initial[path] for path in self.state.paths if path in initial}
         q, u, places = starting(self.mechanism, {name: initial[name] for name in initial if name not in own}, speeds)
+        given = u
         if self.constraints:
             # To find the nearest pose can take as long as the motion: the same start is not looked for again.
             start = (q, u, places)
@@ -326,13 +327,17 @@ class Simulation:
                 self._start = start, (values.tolist(), rates.tolist())
             q, u = self._start[1]
         y = self.state.pack(q, u)
-        numbers = {path: number for number, path in enumerate(self.state.paths, 2 * len(self.state.order))}
+        moving = 2 * len(self.state.order)
+        numbers = {path: number for number, path in enumerate(self.state.paths, moving)}
         for path, number in numbers.items():
             y[number] = float(own.get(path, y[number]))
             if not isfinite(y[number]):
                 raise SettingError(f"the state '{path}' starts at {y[number]}; give a number")
         if equilibrate:
-            y = self.engine.equilibrated(0.0, y)
+            # OpenSim does so in the assembled pose, before it makes the speeds fulfil the constraints.
+            infos = self.mechanism.coordinates
+            given = [u[k] if info.locked or info.prescribed is not None else given[k] for k, info in enumerate(infos)]
+            y[moving:] = self.engine.equilibrated(0.0, [*self.state.pack(q, given)[:moving], *y[moving:]])[moving:]
             for path, value in own.items():
                 y[numbers[path]] = float(value)
         return y

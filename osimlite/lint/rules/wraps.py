@@ -78,21 +78,26 @@ def wrap_range(subject: Subject, found: Found) -> None:
     """
     for path in subject.each(GeometryPath):
         count = len(path.path_point_set.objects)
+        owner, is_left = subject.tree.parent_of(path), False
         for wrap in _wraps(path):
             first, last = wrap.range
-            tells = f"the range of {called(wrap)} of {called(subject.tree.parent_of(path) or path)}, {first} {last},"
+            surface = subject.target_of(wrap, "wrap_object")
+            is_off = isinstance(surface, WrapObject) and not surface.active
+            tells = f"the range of {called(wrap)} of {called(owner or path)}, {first} {last},"
             start, end = max(first, 1), last if last > 0 else count
-            if end > count:
+            if end > count and start <= end and not (is_left or is_off):
                 fate = "OpenSim fails when it computes its length"
                 found(
                     f"{tells} ends beyond the {counted(count, 'point')} of the path: {fate}",
                     wrap,
                     tag="range",
-                    severity=ERROR,
+                    # Nobody asks for the length of a force that is off.
+                    severity=WARNING if getattr(owner, "appliesForce", True) is False else ERROR,
                 )
-            elif start >= end:
-                others = " and OpenSim leaves out the wraps after it" if start > end else ""
+            elif start >= end or end > count:
+                others = " and OpenSim leaves out the wraps after it" if start > end and not is_off else ""
                 found(f"{tells} holds no piece of the path: it never wraps{others}", wrap, tag="range")
+            is_left = is_left or (start > end and not is_off)
 
 
 def _base(subject: Subject, surface: WrapObject) -> tuple[Component, Pose] | None:

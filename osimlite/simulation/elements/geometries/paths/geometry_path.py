@@ -196,6 +196,14 @@ def read(builder: ElementBuilder, owner: Any) -> ThroughPoints:
         if type(surface) not in LAWS:
             raise builder.unsupported(owner, f" around the {kind_of(surface)} '{surface.name}'")
         surfaces.append(_surface(builder, wrap, surface, numbers[id(surface)], alone, len(points)))
+        first, last = surfaces[-1].first, surfaces[-1].last
+        if surface.active and first > last and not builder.geodesic:
+            # OpenSim goes no further: it does not even look at the wraps that follow.
+            break
+        if surface.active and first <= last and last >= len(points):
+            raise ModelError(
+                f"the range of '{builder.path(wrap)}' ends at point {last + 1}; the path has {len(points)}"
+            )
     if builder.geodesic:
         points = [replace(point, kind=CLAMPED) if point.kind == MOVING else point for point in points]
         pieces = [(surface, k) for surface in surfaces if surface.law for k in range(surface.first, surface.last)]
@@ -217,8 +225,6 @@ def _surface(builder: ElementBuilder, wrap: Any, surface: Any, number: int, alon
     if min(sizes) < 0.0 or (min(sizes) == 0.0 and isinstance(surface, WrapEllipsoid | WrapTorus)):
         raise ModelError(f"'{builder.path(surface)}' has a size that is not positive; give it a positive one")
     first, last = (end - 1 if end >= 1 else other for end, other in zip(wrap.range, (0, points - 1), strict=True))
-    if surface.active and first <= last and last >= points:
-        raise ModelError(f"the range of '{builder.path(wrap)}' ends at point {last + 1}; the path has {points}")
     frame = surface
     while not isinstance(frame, PhysicalFrame):
         frame = builder.tree.parent_of(frame)
