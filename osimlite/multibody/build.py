@@ -7,6 +7,7 @@ import numpy as np
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody.body_constraints import RollingConstraint, WeldConstraint
 from osimlite.multibody.constraints import Constraint, Coupler
+from osimlite.multibody.extremes import any_numbers
 from osimlite.multibody.functions import Function
 from osimlite.multibody.joints import MOTIONS, Mobilizer, motion_types
 from osimlite.multibody.mechanism import Mechanism
@@ -35,6 +36,7 @@ from osimlite.schema.markers import Station
 from osimlite.schema.model import Model, expect_model
 
 
+@any_numbers
 def build_mechanism(model: Model, *, opensim_derivatives: bool = False, rolling: bool = False) -> Mechanism:
     """The tree of bodies and mobilizers that a model describes, with its constraints.
 

@@ -40,12 +40,12 @@ class Univariate(Function):
 
     def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
         """Value, first and second derivative at the one argument."""
-        value, first, second = self._at(float(arguments[0]))
+        value, first, second = self.derivatives(float(arguments[0]))
         return value, np.array((first,)), np.array(((second,),))
 
     def derivatives(self, x: float) -> tuple[float, float, float]:
-        """Value, first and second derivative at `x`, all three as plain numbers."""
-        return self._at(x)
+        """Value, first and second derivative at `x`, all three as plain numbers; NaN where `x` is not finite."""
+        return self._at(x) if math.isfinite(x) else (math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from osimlite.multibody import dynamics
 from osimlite.multibody.assembly import assembled, projected
 from osimlite.multibody.constraints import Constraint, Lock, Prescribed
 from osimlite.multibody.dynamics import MassCentres, Wrench
+from osimlite.multibody.extremes import methods_of_any_numbers
 from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.kinematics import Kinematics, kinematics
 from osimlite.multibody.parts import (
@@ -49,6 +50,7 @@ Values = ArrayLike | Mapping[str, float]
 """One number per coordinate: an array in coordinate order, or numbers by coordinate name."""
 
 
+@methods_of_any_numbers
 @dataclass(frozen=True, eq=False)
 class Mechanism:
     """A tree of bodies under gravity.

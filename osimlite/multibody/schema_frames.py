@@ -111,7 +111,8 @@ class Placements:
             raise ModelError(f"point_a, point_b and point_c of the frame '{path}' lie on a line; move one off it")
         # The third vector completes the two, in the order of the two axes.
         first, second = _axis(frame.ab_axis), _axis(frame.ab_x_ac_axis)
-        if first @ second != 0.0:
+        first = np.eye(3)[0] if first is None else first
+        if second is None or first @ second != 0.0:
             second = np.roll(np.abs(first), 1)
         vectors = [vector / np.linalg.norm(vector) for vector in (along, across, cross(along, across))]
         axes = [first, second, cross(first, second)]
@@ -119,8 +120,11 @@ class Placements:
         return bases[0], transform(rotation, origin)
 
 
-def _axis(word: str) -> Array:
-    """The unit vector that a word like ``-y`` names."""
+def _axis(word: str) -> Array | None:
+    """The unit vector that a word like ``-y`` names, by its first letter as in OpenSim; None for another word."""
+    sign, letter = (word[:1], word[1:2]) if word[:1] in ("+", "-") else ("+", word[:1])
+    if letter.lower() not in ("x", "y", "z"):
+        return None
     vector = np.zeros(3)
-    vector["xyz".index(word[-1].lower())] = -1.0 if word.startswith("-") else 1.0
+    vector["xyz".index(letter.lower())] = -1.0 if sign == "-" else 1.0
     return vector

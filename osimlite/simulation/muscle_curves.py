@@ -13,6 +13,7 @@ from osimlite._lazy import shown_in_notebooks
 from osimlite._require import require
 from osimlite.errors import SettingError, SimulationError
 from osimlite.multibody import build_mechanism
+from osimlite.multibody.extremes import any_numbers
 from osimlite.multibody.functions import Constant
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass, replace
@@ -105,6 +106,7 @@ class MuscleCurves(Tabular):
         return [k for k in range(len(self.muscles)) if not arms or any(rows[:, k].any() for rows in arms)]
 
 
+@any_numbers
 def muscle_curves(
     model: Model,
     values: Mapping[str, Sequence[float]],

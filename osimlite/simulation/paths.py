@@ -11,6 +11,7 @@ import numpy as np
 from osimlite._lazy import shown_in_notebooks
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Constraint, Lock
+from osimlite.multibody.extremes import any_numbers, methods_of_any_numbers
 from osimlite.multibody.kinematics import Kinematics, kinematics
 from osimlite.multibody.linear import shortest, stacked
 from osimlite.multibody.mechanism import Values
@@ -32,6 +33,7 @@ ROUNDING = 1e-12
 """What is left of a moment arm, or a speed, of 0."""
 
 
+@any_numbers
 def paths(model: Model, wrapping: str = OPENSIM) -> Paths:
     """The paths of a model: of its muscles, ligaments, springs and actuators, whether these act or not.
 
@@ -47,6 +49,7 @@ def paths(model: Model, wrapping: str = OPENSIM) -> Paths:
     return Paths(model, wrapping)
 
 
+@methods_of_any_numbers
 class Paths:
     """The paths of a model, see :func:`paths`.
 

@@ -12,12 +12,11 @@ from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from osimlite.errors import SettingError, SimulationError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.dynamics import require_numbers
+from osimlite.multibody.extremes import any_numbers
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import tell_doubt
 from osimlite.schema.model import Model, expect_model
@@ -39,9 +38,6 @@ from osimlite.simulation.trajectory import Interrupted, Report, Trajectory
 
 if TYPE_CHECKING:
     from osimlite.schema.tree import Tree
-
-QUIET = np.errstate(over="ignore", divide="ignore", invalid="ignore")
-"""What is not finite is refused by name where it counts; numpy need not warn of it too."""
 
 
 def simulate(model: Model, to: float = 2.0, engine: str = "auto", **choices: Any) -> Trajectory:
@@ -141,6 +137,7 @@ class Simulation:
         paths: of all states, in the order of OpenSim.
     """
 
+    @any_numbers
     def __init__(self, model: Model, engine: str = "auto", **choices: Any) -> None:
         self.options = chosen = Options.of(choices)
         # Only Bullet has a window.
@@ -283,7 +280,7 @@ class Simulation:
         self.close()
 
     # --------------------------------------------------------------------------------------------- helpers
-    @QUIET
+    @any_numbers
     def _moved(
         self, y: list[float], settings: Settings, times: Sequence[float], progress: Progress | None
     ) -> tuple[Recorder, Stepper, Sequence[Any]]:
@@ -293,14 +290,14 @@ class Simulation:
         recorder.begin(stepper)
         return recorder, stepper, stepper.table(times, progress)
 
-    @QUIET
+    @any_numbers
     def _require_inertia(self, y: Sequence[float]) -> None:
         """SimulationError, the same for all engines, if the first start is one where a motion has no inertia."""
         if not self._has_inertia:
             self.mechanism.acceleration(self.state.values(y), self.state.speeds(y))
             self._has_inertia = True
 
-    @QUIET
+    @any_numbers
     def initial_state(
         self, initial: Mapping[str, float], speeds: Mapping[str, float], *, equilibrate: bool = False
     ) -> list[float]:
@@ -390,7 +387,7 @@ class Simulation:
         return Trajectory(self.mechanism, times, values, speeds, report, auxiliary, self.paths, self._snapshot)
 
 
-@QUIET
+@any_numbers
 def _require_finite_start(mechanism: Mechanism) -> None:
     """SimulationError if no engine can compute with the numbers of a mechanism."""
     for what in ("value", "speed"):

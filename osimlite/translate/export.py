@@ -10,6 +10,7 @@ from typing import Literal
 from osimlite.errors import OsimliteError
 from osimlite.meshes.folders import MeshFolders
 from osimlite.multibody import build_mechanism
+from osimlite.multibody.extremes import any_numbers
 from osimlite.records import dataclass, field
 from osimlite.robot.build import build_robot
 from osimlite.robot.merge_fixed import merge_fixed
@@ -73,6 +74,7 @@ class Urdf:
         )
 
 
+@any_numbers
 def to_urdf(
     model: Model,
     *,

@@ -16,6 +16,7 @@ from osimlite.meshes import unit_shapes
 from osimlite.meshes.folders import MeshFolders
 from osimlite.meshes.read import read_surface
 from osimlite.meshes.surface import Surface
+from osimlite.multibody.extremes import any_numbers
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array, offset, rotation_about, transform
 from osimlite.robot.visuals import frame_of
@@ -64,6 +65,7 @@ THICKEST = 0.025
 """No fibers are drawn with a greater radius, m."""
 
 
+@any_numbers
 def build_scene(
     model: Model, mechanism: Mechanism, folders: MeshFolders | None = None, wrapping: str = OPENSIM
 ) -> Scene:

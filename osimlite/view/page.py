@@ -16,6 +16,7 @@ from osimlite.lint.diagnostic import Finding
 from osimlite.meshes.surface import Surface
 from osimlite.meshes.unit_shapes import normals_of
 from osimlite.multibody.constraints import Coupler, Lock, Prescribed
+from osimlite.multibody.extremes import any_numbers
 from osimlite.multibody.functions import IDENTITY, Function
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.motions import AxisMotion
@@ -78,6 +79,7 @@ def page_text(data: Mapping[str, Any]) -> str:
     return text
 
 
+@any_numbers
 def page_data(
     model: Model,
     scene: Scene,

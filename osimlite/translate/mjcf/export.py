@@ -13,6 +13,7 @@ from osimlite.document.printer import to_text
 from osimlite.errors import SettingError
 from osimlite.meshes.folders import MeshFolders
 from osimlite.multibody import build_mechanism
+from osimlite.multibody.extremes import any_numbers
 from osimlite.multibody.mechanism import Values
 from osimlite.records import dataclass, field
 from osimlite.robot.build import build_robot
@@ -91,6 +92,7 @@ class Mjcf:
         )
 
 
+@any_numbers
 def to_mjcf(
     model: Model,
     *,
