@@ -38,6 +38,8 @@ Engine = Annotated[
     str,
     Option(help="What computes the accelerations: 'bullet', 'compiled', or 'auto': the first that is installed."),
 ]
+FirstFrame = Annotated[float, Option("--from", metavar="SECONDS", help="Time of the first frame that counts.")]
+LastFrame = Annotated[float, Option("--until", metavar="SECONDS", help="Time of the last frame that counts.")]
 Lowpass = Annotated[
     float | None,
     Option(metavar="HZ", help="Filter the coordinates first, as OpenSim's tools do; 6 is usual.", show_default=False),

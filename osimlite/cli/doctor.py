@@ -25,6 +25,8 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "translate": ("numpy",),
     "simulate": ("numpy",),
     "kinematics": ("numpy",),
+    "scale": ("numpy",),
+    "ik": ("numpy",),
     "inverse-dynamics": ("numpy", "scipy"),
     "run": ("numpy", "scipy"),
     "view": ("numpy",),
@@ -49,7 +51,21 @@ NEEDS: dict[str, tuple[str, ...]] = {
 }
 """The packages that a command, or an option of it, cannot do without, but for those of the plain installation."""
 
-EXTRAS = ("", "sim", "bullet", "view", "plot", "sweep", "optimize", "rerun", "lsp", "mujoco", "yaml", "frame", "oracle")
+EXTRAS = (
+    "",
+    "sim",
+    "bullet",
+    "view",
+    "plot",
+    "sweep",
+    "optimize",
+    "rerun",
+    "lsp",
+    "mujoco",
+    "yaml",
+    "frame",
+    "oracle",
+)
 """The plain installation and what is added to it; `all` and `dev` gather these, `fast` is an older name of `sim`."""
 
 MESHES = (".vtp", ".stl", ".obj")

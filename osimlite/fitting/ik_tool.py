@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from osimlite.errors import SettingError
-from osimlite.fitting.inverse_kinematics import FittedMotion, fitted, marker_stations
+from osimlite.fitting.inverse_kinematics import ADVICE, FittedMotion, fitted, marker_stations
 from osimlite.fitting.marker_data import MarkerData, common
 from osimlite.fitting.pose_layout import Goal
 from osimlite.multibody import build_mechanism
@@ -25,7 +25,7 @@ from osimlite.schema.tools.inverse_kinematics import (
 )
 from osimlite.simulation.files.old_storage import NOTES, old_storage_text
 from osimlite.simulation.files.storage import StoTable, read_sto
-from osimlite.text import did_you_mean
+from osimlite.text import counted, did_you_mean, listed
 
 UNNAMED = ("", "Unassigned")
 """What stands for no file."""
@@ -138,3 +138,22 @@ def motion_text(motion: FittedMotion) -> str:
 def coordinate_table(name: str, folder: Path) -> StoTable | None:
     """The coordinate file of a setup, if it names one."""
     return None if name in UNNAMED else read_sto(folder / name)
+
+
+def told(motion: FittedMotion) -> Iterator[str]:
+    """What a user should know of a motion, beside what OpenSim's documentation advises."""
+    found = motion.summary
+    if "rms_marker_error" in found:
+        rms, largest = found["rms_marker_error"], found["largest_marker_error"]
+        advised = "" if rms < ADVICE[0] and largest < ADVICE[1] else "; OpenSim advises less than 2 and 4 cm"
+        yield (
+            f"{found['frames']} frames, {found['markers']} markers: errors of {100.0 * rms:.2f} cm (root mean square), "
+            f"at most {100.0 * largest:.2f} cm ({found['worst_marker']} at {found['worst_time']:g} s){advised}"
+        )
+    if found["partly_unseen"]:
+        parts = [f"{name} ({100.0 * part:.3g} %)" for name, part in found["partly_unseen"].items()]
+        yield f"not seen in every frame: {listed(parts)}"
+    if found["frames_unseen"]:
+        yield f"{counted(found['frames_unseen'], 'frame')} without any marker: the pose stays as it was before"
+    if found["frames_unsettled"]:
+        yield f"in {counted(found['frames_unsettled'], 'frame')} the best pose was not reached"

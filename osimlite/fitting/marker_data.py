@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite._require import require
-from osimlite.errors import DocumentError, OsimliteError, SettingError
+from osimlite.errors import DocumentError, MissingDependency, OsimliteError, SettingError
 from osimlite.files import read_file
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
@@ -185,9 +185,12 @@ def read_c3d(path: str | Path) -> MarkerData:
         MissingDependency: ezc3d is not installed.
     """
     read_file(path)
-    ezc3d: Any = require("ezc3d", extra="c3d", purpose="a .c3d file")
     try:
-        found = ezc3d.c3d(str(path))
+        found: Any = import_module("ezc3d").c3d(str(path))
+    except ImportError:
+        raise MissingDependency(
+            "a .c3d file is read by ezc3d, which is not installed; run: pip install ezc3d", file=str(path)
+        ) from None
     except (OSError, RuntimeError, ValueError) as error:
         raise DocumentError(f"the file cannot be read: {error}", file=str(path)) from None
     points = found["parameters"]["POINT"]

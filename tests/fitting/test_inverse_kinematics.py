@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.errors import DocumentError, OsimliteError, SettingError
+from osimlite.errors import DocumentError, MissingDependency, OsimliteError, SettingError
 from osimlite.fitting.marker_data import MarkerData, read_trc
 from osimlite.simulation.files.trc import write_trc
 
@@ -200,3 +201,28 @@ def test_markers_of_a_table(tmp_path: Path) -> None:
     write_sto(path, "markers", [0.0, 0.1, 0.2, 0.3], columns, places.reshape(4, -1).tolist())
     assert MarkerData.of(path).names == MARKERS
     assert osimlite.inverse_kinematics(free_body(), path).values == pytest.approx(motion(4), abs=1e-8)
+
+
+def test_c3d_files_need_a_package_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And say which."""
+    monkeypatch.setitem(sys.modules, "ezc3d", None)
+    (tmp_path / "walk.c3d").write_bytes(b"")
+    with pytest.raises(MissingDependency, match="pip install ezc3d"):
+        osimlite.inverse_kinematics(free_body(), tmp_path / "walk.c3d")
+
+
+def test_c3d_files_are_read(tmp_path: Path) -> None:
+    """In their unit, with their rate; what was not seen is NaN."""
+    ezc3d = pytest.importorskip("ezc3d")
+    places = positions(motion(5))
+    file = ezc3d.c3d()
+    file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
+    file["parameters"]["POINT"]["RATE"]["value"] = [100]
+    file["parameters"]["POINT"]["LABELS"]["value"] = list(MARKERS)
+    points = np.ones((4, 4, 5))
+    points[:3] = 1000.0 * np.moveaxis(places, (0, 1, 2), (2, 1, 0))
+    file["data"]["points"] = points
+    file.write(str(tmp_path / "walk.c3d"))
+    data = MarkerData.of(tmp_path / "walk.c3d")
+    assert data.names == MARKERS and np.diff(data.times) == pytest.approx(0.01)
+    assert data.positions == pytest.approx(places, abs=1e-6)

@@ -1,0 +1,69 @@
+"""``osimlite ik``: the motion of a model that fits measured markers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from osimlite.cli import _options as options
+from osimlite.cli._command import Argument, Option, command
+
+
+@command
+def ik(
+    file: options.File,
+    trial: Annotated[Path, Argument(help="Measured markers: .trc, .c3d, or .sto.", show_default=False)],
+    weight: Annotated[
+        list[str] | None,
+        Option("--weight", metavar="MARKER=NUMBER", help="How much a marker counts; 1 if left out, 0 for nothing."),
+    ] = None,
+    keep: Annotated[
+        list[str] | None,
+        Option(
+            "--keep",
+            metavar="COORDINATE=NUMBER",
+            help="How much a coordinate is kept at its default (1/rad²); beside the mean of the markers 1 is much.",
+        ),
+    ] = None,
+    first: options.FirstFrame = float("-inf"),
+    last: options.LastFrame = float("inf"),
+    free: Annotated[bool, Option("--without-constraints", help="Let go of the constraints of the model.")] = False,
+    output: options.Folder = None,
+) -> None:
+    """Find the motion that fits measured markers: writes ik.mot and marker_errors.sto.
+
+    Each frame is the pose with the least weighted mean of squared distances, to the last digits. Locked coordinates
+    stay at their defaults, clamped ones in their ranges. ik.mot has degrees, as OpenSim's; marker_errors.sto how far
+    each marker is from where it was measured (m).
+
+    Example: osimlite ik gait2392.osim walk.trc --weight RASI=10 -o results
+    """
+    from osimlite.cli._console import say
+    from osimlite.document.reader import read
+    from osimlite.files import make_folder, write_atomically
+    from osimlite.fitting.ik_tool import motion_text, told
+    from osimlite.fitting.inverse_kinematics import inverse_kinematics
+    from osimlite.simulation.files.storage import write_sto
+
+    weights = {name: _number(text, name) for name, text in options.named_words(weight, "--weight").items()}
+    kept = {name: _number(text, name) for name, text in options.named_words(keep, "--keep").items()}
+    motion = inverse_kinematics(
+        read(file), trial, weights=weights, coordinates=kept, constraints=not free, start=first, end=last
+    )
+    folder = options.results_folder(file, output)
+    make_folder(folder)
+    write_atomically(folder / "ik.mot", motion_text(motion))
+    errors = motion.marker_errors.tolist()
+    write_sto(folder / "marker_errors.sto", "marker errors", motion.times.tolist(), motion.markers, errors)
+    for line in told(motion):
+        say(line)
+    say(f"wrote {folder / 'ik.mot'} and {folder / 'marker_errors.sto'}")
+
+
+def _number(text: str, name: str) -> float:
+    from osimlite.errors import SettingError
+
+    try:
+        return float(text)
+    except ValueError:
+        raise SettingError(f"'{text}' is no number for '{name}'; write {name}=2.5") from None

@@ -1,0 +1,108 @@
+"""``osimlite scale``: a generic model made as large and as heavy as a subject."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from osimlite.cli import _options as options
+from osimlite.cli._command import Argument, Option, command
+
+
+@command
+def scale(
+    file: options.File,
+    static: Annotated[
+        Path | None, Argument(help="Measured markers of the subject, standing: .trc, .c3d, or .sto.")
+    ] = None,
+    distance: Annotated[
+        list[str] | None,
+        Option(
+            "--distance",
+            metavar="BODY=A:B",
+            help="Scale a body by the distance of markers A and B, or the mean over several pairs with commas; BODY.XZ "
+            "along these axes only. May be repeated.",
+        ),
+    ] = None,
+    factor: Annotated[
+        list[str] | None,
+        Option("--factor", metavar="BODY=X[,Y,Z]", help="Scale a body by a number, or one for each axis."),
+    ] = None,
+    mass: Annotated[float, Option("--mass", metavar="KG", help="What the subject weighs.")] = -1.0,
+    preserve: Annotated[
+        bool, Option("--preserve-masses", help="Let the bodies keep their shares of the mass.")
+    ] = False,
+    place: Annotated[
+        bool, Option("--place", help="Move the markers of the model to where they were measured.")
+    ] = False,
+    first: options.FirstFrame = float("-inf"),
+    last: options.LastFrame = float("inf"),
+    output: Annotated[
+        Path | None, Option("-o", "--output", metavar="FILE", help="The scaled model.", show_default="scaled.osim")
+    ] = None,
+) -> None:
+    """Scale a model to a subject, as OpenSim's ScaleTool does.
+
+    Lengths of muscles, masses and inertias follow. With --place the model is posed as the subject stood, and its
+    markers are moved to the measured places.
+
+    Example: osimlite scale gait2392.osim static.trc --distance femur_r=RASI:RKNE --mass 72 --place -o subject.osim
+    """
+    from osimlite.cli._console import say
+    from osimlite.document.printer import write
+    from osimlite.document.reader import read
+    from osimlite.fitting.ik_tool import told
+    from osimlite.fitting.scale_tool import scale as scaled
+
+    measurements = {
+        body: ([_pair(pair, body) for pair in pairs.split(",")], {body.partition(".")[0]: _axes(body)})
+        for body, pairs in options.named_words(distance, "--distance", "BODY=MARKER:MARKER").items()
+    }
+    factors = {body: _factors(text, body) for body, text in options.named_words(factor, "--factor").items()}
+    result = scaled(
+        read(file),
+        static,
+        measurements=measurements,
+        factors=factors,
+        mass=mass,
+        preserve_mass_distribution=preserve,
+        place=place,
+        start=first,
+        end=last,
+    )
+    assert result.measured is not None
+    for name, ratio in result.measured.ratios.items():
+        say(f"{name}: {ratio:.6g}")
+    for note in result.measured.notes:
+        say(note)
+    if result.placed is not None:
+        for line in told(result.placed.pose):
+            say(line)
+    path = Path("scaled.osim") if output is None else output
+    write(result.model, path)
+    say(f"wrote {path}")
+
+
+def _pair(text: str, body: str) -> tuple[str, str]:
+    from osimlite.errors import SettingError
+
+    one, _, two = text.partition(":")
+    if not one or not two:
+        raise SettingError(f"'{text}' names no pair of markers for '{body}'; write {body}=MARKER:MARKER")
+    return one.strip(), two.strip()
+
+
+def _axes(body: str) -> str:
+    return body.partition(".")[2] or "XYZ"
+
+
+def _factors(text: str, body: str) -> tuple[float, ...]:
+    from osimlite.errors import SettingError
+
+    try:
+        numbers = [float(word) for word in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (1, 3):
+        raise SettingError(f"'{text}' are no factors for '{body}'; write one number, or three with commas")
+    return tuple(numbers * 3)[:3]

@@ -1,0 +1,73 @@
+"""``ik`` and ``scale`` from the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.simulation.files.storage import read_sto
+from osimlite.simulation.files.trc import write_trc
+from tests.cli.command import run
+
+POINTS = {"one": (0.1, 0.0, 0.0), "two": (0.0, 0.2, 0.0), "three": (0.0, 0.0, 0.3), "four": (0.1, 0.1, 0.1)}
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Path:
+    """A body with markers, and a trial of it."""
+    model = osimlite.Model(name="box")
+    body = osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    model.add(body)
+    model.add(osimlite.FreeJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body))
+    for name, point in POINTS.items():
+        model.add(osimlite.Marker(name=name, socket_parent_frame=body, location=point))
+    osimlite.write(model, tmp_path / "box.osim")
+    mechanism: Any = osimlite.mechanism(model)
+    poses = [0.2 * k * np.array((0.3, -0.2, 0.1, 0.5, 0.6, 0.7)) for k in range(5)]
+    rows = [[x for p in POINTS.values() for x in mechanism.at(q).point(0, np.array(p)).tolist()] for q in poses]
+    write_trc(tmp_path / "walk.trc", [0.1 * k for k in range(5)], list(POINTS), rows)
+    return tmp_path
+
+
+def test_a_trial_is_fitted(lab: Path) -> None:
+    done = run("ik", "box.osim", "walk.trc", "--weight", "one=10", "--from", "0.1", "-o", "out", folder=lab)
+    assert (done.code, done.err) == (0, "")
+    assert "4 frames, 4 markers: errors of 0.00 cm" in done.out
+    table = read_sto(lab / "out" / "ik.mot")
+    assert table.in_degrees and table.times == pytest.approx([0.1, 0.2, 0.3, 0.4])
+    assert table.rows[-1] == pytest.approx([*np.rad2deg((0.24, -0.16, 0.08)), 0.4, 0.48, 0.56], abs=1e-6)
+    assert read_sto(lab / "out" / "marker_errors.sto").columns == tuple(POINTS)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("ik", "box.osim", "walk.trc", "--weight", "on=1"), "'box' has no marker 'on'"),
+        (("ik", "box.osim", "walk.trc", "--weight", "one=much"), "'much' is no number for 'one'"),
+        (("ik", "box.osim", "walk.trc", "--keep", "knee=1"), "no coordinate 'knee'"),
+        (("ik", "box.osim", "walk.trc", "--from", "7"), "no frame of 'walk.trc' lies between"),
+        (("ik", "box.osim", "none.trc"), "none.trc: cannot read the file"),
+        (("ik", "box.osim", "box.osim"), "it is no marker file"),
+        (("scale", "box.osim", "--distance", "b=one:two"), "there are no markers of it"),
+        (("scale", "box.osim", "walk.trc", "--distance", "b=one"), "'one' names no pair of markers for 'b'"),
+        (("scale", "box.osim", "--factor", "b=1,2"), "'1,2' are no factors for 'b'"),
+        (("scale", "box.osim", "--factor", "c=2"), "'box' has no body 'c'"),
+    ],
+)
+def test_what_is_wrong_is_told(lab: Path, words: tuple[str, ...], said: str) -> None:
+    done = run(*words, folder=lab)
+    assert done.code in (1, 2) and said in done.err, done.err
+    assert sorted(path.name for path in lab.iterdir()) == ["box.osim", "walk.trc"]
+
+
+def test_a_model_is_scaled(lab: Path) -> None:
+    done = run("scale", "box.osim", "walk.trc", "--distance", "b.XY=one:two", "--mass", "3", "--place", folder=lab)
+    assert (done.code, done.err) == (0, "") and "b.XY: 1" in done.out and "wrote scaled.osim" in done.out
+    model = osimlite.read(lab / "scaled.osim")
+    assert model["/bodyset/b"].mass == pytest.approx(3.0)
+    done = run("scale", "box.osim", "--factor", "b=2,1,1", "-o", "long.osim", folder=lab)
+    assert done.code == 0 and osimlite.read(lab / "long.osim")["/markerset/one"].location == (0.2, 0.0, 0.0)

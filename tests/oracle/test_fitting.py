@@ -1,0 +1,144 @@
+"""Inverse kinematics and scaling against OpenSim's own tools, live."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.fitting.scaling import scale_model
+from osimlite.simulation.files.storage import read_sto
+from osimlite.simulation.files.trc import write_trc
+from tests.fitting.test_scaling import assert_same
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytestmark = pytest.mark.oracle
+
+SCALE = """
+import json, sys, opensim
+opensim.Logger.setLevelString("Off")
+model = opensim.Model("model.osim")
+state, factors = model.initSystem(), opensim.ScaleSet()
+for name, (x, y, z) in json.loads(sys.argv[1]).items():
+    scale = opensim.Scale()
+    scale.setSegmentName(name)
+    scale.setScaleFactors(opensim.Vec3(x, y, z))
+    scale.setApply(True)
+    factors.cloneAndAppend(scale)
+model.scale(state, factors, sys.argv[3] == "True", float(sys.argv[2]))
+model.printToXML("theirs.osim")
+"""
+FIT = """
+import sys, opensim
+opensim.Logger.setLevelString("Off")
+tool = opensim.InverseKinematicsTool()
+tool.set_model_file("model.osim")
+tool.set_marker_file("trial.trc")
+tool.set_accuracy(float(sys.argv[1]))
+tool.setStartTime(0.0)
+tool.setEndTime(10.0)
+tool.setOutputMotionFileName("theirs.mot")
+tool.run()
+"""
+
+
+def ask(script: str, folder: Path, *words: str) -> None:
+    """Let OpenSim work in a process of its own, which may crash."""
+    done = subprocess.run(
+        [sys.executable, "-c", script, *words], cwd=folder, capture_output=True, text=True, timeout=240, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", ["m0005", "m0013", "m0036", "m0065", "m0109", "m0139", "m0163", "m0172", "m0954"])
+@pytest.mark.parametrize("ground", [False, True])
+def test_real_models_are_scaled_alike(corpus: Any, name: str, ground: bool, tmp_path: Path) -> None:
+    """By random factors of all bodies, with the mass of a subject or without."""
+    converted = next(model.converted for model in corpus if model.id == name)
+    (tmp_path / "model.osim").write_bytes(gzip.decompress(converted.read_bytes()))
+    model = osimlite.read(tmp_path / "model.osim")
+    rng = np.random.default_rng(int(name[1:]) + ground)
+    factors = {body.name: rng.uniform(0.8, 1.3, 3).round(6).tolist() for body in model.components(osimlite.Body)}
+    if ground:
+        factors["ground"] = [1.0, 1.0, 1.0]
+    mass, preserves = float(rng.choice([70.0, -1.0])), bool(rng.random() < 0.5)
+    ask(SCALE, tmp_path, json.dumps(factors), str(mass), str(preserves))
+    scale_model(model, factors, mass, preserve_mass_distribution=preserves)
+    osimlite.write(model, tmp_path / "ours.osim", numbers="opensim")
+    assert_same(osimlite.read(tmp_path / "ours.osim"), osimlite.read(tmp_path / "theirs.osim"))
+
+
+def model_with(kind: str) -> osimlite.Model:
+    """A pelvis, a thigh and a shank with markers, whose knee is clamped, coupled, locked or loose."""
+    model = osimlite.Model(name="leg")
+    carrier: Any = model.ground
+    for number, joint in enumerate((osimlite.FreeJoint, osimlite.BallJoint, osimlite.UniversalJoint)):
+        body = osimlite.Body(name=f"b{number}", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+        model.add(body)
+        at = model.add(
+            osimlite.PhysicalOffsetFrame(
+                name=f"f{number}", socket_parent=carrier, translation=(0.0, -0.4 * (number > 0), 0.0)
+            )
+        )
+        model.add(joint(name=f"j{number}", socket_parent_frame=at, socket_child_frame=body))
+        for count, point in enumerate(((0.1, 0.0, 0.05), (0.0, -0.2, -0.06), (-0.08, -0.3, 0.04), (0.02, -0.1, 0.1))):
+            model.add(osimlite.Marker(name=f"m{number}{count}", socket_parent_frame=body, location=point))
+        carrier = body
+    knee = [item for item in model.components(osimlite.Coordinate) if "/j2/" in item.path]
+    for number, item in enumerate(knee):
+        item.name = f"knee{number}"
+    if kind == "clamped":
+        knee[0].clamped, knee[0].range = True, (-0.3, 2.0)
+    if kind == "locked":
+        knee[1].locked, knee[1].default_value = True, 0.1
+    if kind == "coupled":
+        model.add(
+            osimlite.CoordinateCouplerConstraint(
+                name="c",
+                independent_coordinate_names=("knee0",),
+                dependent_coordinate_name="knee1",
+                coupled_coordinates_function=osimlite.PolynomialFunction(coefficients=(0.4, -0.3, 0.05)),
+            )
+        )
+    return model
+
+
+@pytest.mark.parametrize("kind", ["loose", "clamped", "locked", "coupled"])
+def test_minima_are_those_of_opensim(kind: str, tmp_path: Path) -> None:
+    """Noisy markers, some of them missing: OpenSim at accuracy 1e-9 is as near as it can be."""
+    model, rng = model_with(kind), np.random.default_rng(4)
+    osimlite.write(model, tmp_path / "model.osim")
+    mechanism = osimlite.mechanism(model)
+    names = [marker.name for marker in model.components(osimlite.Marker)]
+    stations = [mechanism.stations[marker.path] for marker in model.components(osimlite.Marker)]
+    count = len(mechanism.coordinates)
+    rows = []
+    for frame in range(12):
+        q = mechanism.assemble(0.3 * np.sin(0.3 * frame + 1.3 * np.arange(count)))
+        state = mechanism.at(q)
+        row = np.concatenate([state.point(*station) for station in stations]) + rng.normal(0.0, 0.01, 3 * len(names))
+        if frame % 3 == 1:
+            row[3 * (frame % 12) :][:3] = np.nan
+        rows.append(row.tolist())
+    write_trc(tmp_path / "trial.trc", [0.1 * frame for frame in range(12)], names, rows)
+    ask(FIT, tmp_path, "1e-9")
+    theirs = read_sto(tmp_path / "theirs.mot")
+    ours = osimlite.inverse_kinematics(model, tmp_path / "trial.trc")
+    assert theirs.columns == ours.coordinates
+    assert not ours.unsettled
+    turning = [info.motion_type == "rotational" for info in mechanism.coordinates]
+    values = np.where(turning, np.deg2rad(theirs.rows), theirs.rows)
+    for q, measured, cost in zip(values, ours.measured, ours.costs, strict=True):
+        state = mechanism.at(q)
+        places = np.array([state.point(*station) for station in stations])
+        assert cost <= 0.5 * np.nanmean(np.sum((places - measured) ** 2, axis=1)) + 1e-12
+    if kind != "clamped":
+        # IPOPT keeps clamped coordinates, and the others with them, off the ends of their ranges.
+        assert ours.in_degrees == pytest.approx(theirs.rows, abs=1e-5)
