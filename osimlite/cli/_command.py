@@ -95,7 +95,7 @@ class Command:
         self.__name__, self.__doc__, self.__module__ = function.__name__, function.__doc__, function.__module__
 
     def __call__(self, *values: Any, **named: Any) -> None:
-        self.function(*values, **named)
+        self.function(*values, **{each.name: each.default for each in self._more()} | named)
 
     def parameters(self) -> list[_Parameter]:
         """What the command takes, in the order of its help."""
