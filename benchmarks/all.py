@@ -128,7 +128,7 @@ def table(rows: list[Aimed]) -> Table:
         beside: list[Any] = ["", "", "", ""]
         if not row.unit:
             beside = [f"{1e3 * median(theirs):.4g}", *(f"{v:.2g}" for v in (median(ratios), min(ratios), max(ratios)))]
-        aim, kept = f"{row.aim:.2g} {row.unit}".strip(), "kept" if row.found <= row.aim else "missed"
+        aim, kept = f"{row.aim:.3g} {row.unit}".strip(), "kept" if row.found <= row.aim else "missed"
         made.add_row(row.pair.name, f"{1e3 * median(ours):.4g}", *beside, aim, kept)
     return made
 
