@@ -1,0 +1,25 @@
+"""OpenSim's ScaleTool: a generic model measured against a subject, scaled, and its markers placed."""
+
+from __future__ import annotations
+
+from osimlite.fitting.ik_tool import told
+from osimlite.fitting.scale_tool import run_scale
+from osimlite.tools.job import Job
+from osimlite.tools.outcome import Outcome
+
+
+def run(job: Job, outcome: Outcome) -> None:
+    """Scale the model and place its markers; write models, factors and the pose that the setup names."""
+    found = run_scale(job.setup, job.file.parent)
+    for name, text in found.texts.items():
+        outcome.text(job.result(name), text)
+    if found.measured is not None:
+        outcome.summary["ratios"] = dict(found.measured.ratios)
+        for name, ratio in found.measured.ratios.items():
+            outcome.tell(name, f"{ratio:.6g}")
+        for note in found.measured.notes:
+            outcome.tell("left out", note)
+    if found.placed is not None:
+        outcome.summary |= found.placed.pose.summary
+        for words in told(found.placed.pose):
+            outcome.tell("markers", words)
