@@ -44,6 +44,7 @@ def validate(
         OsimliteError: no rule has a code in `select` or `ignore`, or a class is declared wrongly.
     """
     from osimlite.document.plugins import used
+    from osimlite.document.reader import collector_paused
     from osimlite.document.source import Source
     from osimlite.lint.engine import check_source, run
     from osimlite.lint.subject import Subject
@@ -65,7 +66,8 @@ def validate(
             report = check_files(project_files([model], passed=passed), config, cached=False, processes=1)
             report.passed = passed
             return report
-        return check_source(model if isinstance(model, Source) else Source.of_file(model), config)
+        with collector_paused():
+            return check_source(model if isinstance(model, Source) else Source.of_file(model), config)
 
 
 def assert_valid(model: Model | str | Path, *, ignore: tuple[str, ...] | list[str] | str | None = None) -> None:
