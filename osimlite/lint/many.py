@@ -10,6 +10,7 @@ from pathlib import Path
 from time import time_ns
 from typing import NamedTuple
 
+from osimlite._cores import cores
 from osimlite.errors import MissingFileError
 from osimlite.files import read_standard_input
 from osimlite.lint.cache import Cache, folder_for, key_of, text_of
@@ -134,8 +135,7 @@ def _processes(jobs: list[Job]) -> int:
             continue
     if size < WORTH_SHARING or len(jobs) < 2:
         return 1
-    present = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
-    return min(present, len(jobs), 61)
+    return min(cores(), len(jobs), 61)
 
 
 def check_one(job: Job) -> Report:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +14,7 @@ from queue import SimpleQueue
 from typing import Any, Protocol
 
 import osimlite
+from osimlite._cores import cores
 from osimlite._require import require
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.sweep.plan import Plan
@@ -81,17 +81,12 @@ def pool(plan: Plan, *, workers: int | None = None, cluster: str | None = None) 
             raise SettingError("a cluster has the workers that were started for it; leave out --workers")
         made = ClusterPool(plan, cluster)
     else:
-        count = workers or _cores()
+        count = workers or cores()
         made = ThreadPool(plan, count) if plan.engine == "compiled" else ProcessPool(plan, count)
     try:
         yield made
     finally:
         made.close()
-
-
-def _cores() -> int:
-    """Those that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class _LocalPool:

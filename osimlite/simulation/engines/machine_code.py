@@ -35,11 +35,11 @@ def make_ready(names: Sequence[str]) -> None:
     missing = [name for name in names if not is_at_hand(name)]
     if not missing:
         return
-    from osimlite.simulation.engines.side_by_side import Helper, cores, made, shares
+    from osimlite.simulation.engines.side_by_side import Helper, compilers, made, shares
 
     for name in missing:
         _log.info("compiling '%s'", name)
-    own, *others = shares(missing, cores())
+    own, *others = shares(missing, compilers())
     with ExitStack() as stack:
         helpers = [stack.enter_context(Helper(share)) for share in others]
         for name in own:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite._cores import cores
 from osimlite.errors import OsimliteError
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.kernels import layout, record
@@ -44,7 +44,7 @@ def run_many(
     def work(first: int) -> None:
         batch.run(batch.room(), first, min(first + AT_ONCE, count))
 
-    with ThreadPoolExecutor(options.threads or os.cpu_count()) as pool:
+    with ThreadPoolExecutor(options.threads or cores()) as pool:
         list(pool.map(work, range(0, count, AT_ONCE)))
     names = [*engine.contacts, *(watch.name for watch in options.watches)]
     kept = [rows[:total] for rows, total in zip(batch.events, batch.counts[:, record.EVENTS], strict=True)]

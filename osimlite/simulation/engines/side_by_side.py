@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import multiprocessing
-import os
 import subprocess
 import sys
 import tempfile
@@ -14,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple
 
+from osimlite._cores import cores
 from osimlite.errors import OsimliteError
 from osimlite.simulation.engines.sources import digest_of, functions_within
 from osimlite.simulation.kernels.table import law_function
@@ -46,11 +46,11 @@ def _size(name: str) -> int:
     return sum(len(part.__code__.co_code) for part in functions_within(law_function(name)))
 
 
-def cores() -> int:
+def compilers() -> int:
     """How many processes may compile: as many as there are cores, but one if this is itself one of several."""
     if multiprocessing.parent_process() is not None or not Path(sys.executable or "").name.startswith("python"):
         return 1
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return cores()
 
 
 def made(name: str) -> Made:
