@@ -18,7 +18,7 @@ from osimlite.multibody.constraints import Lock
 from osimlite.multibody.dynamics import require_numbers
 from osimlite.multibody.extremes import any_numbers
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.quantity import tell_doubt
+from osimlite.quantity import tell, tell_doubt
 from osimlite.schema.model import Model, expect_model
 from osimlite.schema.snapshot import Snapshot
 from osimlite.simulation.constrained import constraints_on, kept_state
@@ -26,7 +26,7 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import AUTO, engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
-from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, check_integrator
+from osimlite.simulation.integrators import DEFAULT_ACCURACY, LOOSE, MERSON, check_integrator
 from osimlite.simulation.options import PER_RUN, Options
 from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.simulation.recorder import Recorder
@@ -207,6 +207,11 @@ class Simulation:
         accuracy = DEFAULT_ACCURACY if chosen.accuracy is None else chosen.accuracy
         integrator = MERSON if chosen.integrator is None else chosen.integrator
         check_integrator(integrator)
+        if fixed_step is None and LOOSE < accuracy < 1.0:
+            tell(
+                f"an accuracy of {accuracy:g} is so loose that a motion may end far from the model's own; "
+                f"take {LOOSE:g} or less"
+            )
         if chosen.show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
         if isinstance(initial, str | Path):

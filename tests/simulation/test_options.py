@@ -7,7 +7,7 @@ from dataclasses import FrozenInstanceError, fields
 import pytest
 
 import osimlite
-from osimlite.errors import SettingError
+from osimlite.errors import DoubtfulWarning, SettingError
 from osimlite.simulation import Options, Simulation
 from osimlite.simulation.options import PER_RUN
 from tests.simulation.damped import damped
@@ -40,3 +40,11 @@ def test_every_option_is_described():
     assert all(f"        {name}: " in (Options.__doc__ or "") for name in names)
     with pytest.raises(FrozenInstanceError):
         Options().accuracy = 1.0
+
+
+@pytest.mark.parametrize("integrator", ["merson", "rosenbrock"])
+def test_an_accuracy_that_promises_nothing_is_told(integrator):
+    simulation = Simulation(damped(), "compiled")
+    with pytest.warns(DoubtfulWarning, match=r"an accuracy of 0\.1 is so loose .* take 0\.01 or less"):
+        simulation.run(0.1, accuracy=0.1, integrator=integrator)
+    simulation.run(0.1, accuracy=0.01, integrator=integrator)
