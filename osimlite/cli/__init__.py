@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
     from typer import Typer
@@ -143,29 +143,43 @@ def _run(words: list[str]) -> None:
     except OsimliteError as error:
         complain(error, _built_in(error))
         raise SystemExit(error.exit_code) from None
-    except KeyboardInterrupt:
-        complain("interrupted")
-        raise SystemExit(130) from None
-    except OSError as error:
+    except (Exception, KeyboardInterrupt) as error:
+        if _was_interrupted(error):
+            complain("interrupted")
+            raise SystemExit(130) from None
+        _tell(error, words)
+
+
+def _was_interrupted(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an error: classes that were being made, and what reads options, raise their own."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
+def _tell(error: BaseException, words: list[str]) -> NoReturn:
+    """Say in a sentence what went wrong besides our own errors, if that is known, and exit."""
+    from osimlite.cli._console import complain
+
+    if isinstance(error, OSError):
         # Whoever read our output has gone, which Windows tells as an invalid argument of no file.
         if not isinstance(error, BrokenPipeError) and (error.errno != errno.EINVAL or error.filename is not None):
-            raise
+            raise error
         # Python would complain once more when it closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
-    except ModuleNotFoundError as error:
+    if isinstance(error, ModuleNotFoundError):
         from osimlite.cli.doctor import bringing
 
         extra = bringing(error.name)
         if extra is None:
-            raise
+            raise error
         complain(f"'{words[0]}' needs {error.name}, which is not installed; run: pip install 'osimlite[{extra}]'")
         raise SystemExit(2) from None
-    except Exception as error:
-        # The library that reads options does not tell under what name it can be caught.
-        if not hasattr(error, "format_message"):
-            raise
-        context = getattr(error, "ctx", None)
-        path = context.command_path if context is not None else "osimlite"
-        complain(f"{error.format_message().rstrip('.')}; '{path} --help' lists what there is")
-        raise SystemExit(2) from None
+    # The library that reads options does not tell under what name it can be caught.
+    if not hasattr(error, "format_message"):
+        raise error
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context is not None else "osimlite"
+    complain(f"{error.format_message().rstrip('.')}; '{path} --help' lists what there is")
+    raise SystemExit(2) from None
