@@ -69,9 +69,9 @@ def run(
     failed = False
     if diff:
         shown = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
-        count, left = (sum(counts[place] for counts in shown) for place in (0, 1))
+        count, left, unread = (sum(counts[place] for counts in shown) for place in range(3))
         say(f"Would mend {counted(count, 'place')}{_more(left)}.", err=True)
-        return int(count > 0)
+        return 2 if unread else int(count > 0)
     if fix or unsafe_fixes:
         count, left, failed = _mend_all(files, given, unsafe=unsafe_fixes)
         say(f"Mended {counted(count, 'place')}{_more(left)}.", err=True)
@@ -176,18 +176,25 @@ def _mend(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
     return count, left
 
 
+UNREADABLE = ("OSIM001", "OSIM801")
+"""Rules that find what is no XML, or no table: nothing else of such a file is checked or mended."""
+
+
 def _more(left: int) -> str:
     return f"; --unsafe-fixes would mend {counted(left, 'place')} more" if left else ""
 
 
-def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
-    """Print what mending would change; how many mends that are, and how many guesses are left."""
+def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int, bool]:
+    """Print what mending would change; how many mends that are, how many guesses are left, and if it cannot be read."""
     from osimlite.document.source import Source
 
     source = _source(path)
     after, count, left = _mended(source, given, unsafe, lambda pieces: Source(b"".join(pieces), source.file))
     print_diff(source.text, after.text, path, path)
-    return count, left
+    unread = next((item for item in _check(after, given).findings if item.code in UNREADABLE), None)
+    if unread is not None:
+        complain(f"{path}:{unread.line}:{unread.column}: {unread.message}")
+    return count, left, unread is not None
 
 
 def _width() -> int:

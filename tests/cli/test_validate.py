@@ -162,3 +162,11 @@ def test_settings_of_the_project_hold(faulty):
     (faulty.parent / "pyproject.toml").write_text("[tool.osimlite]\nignores = []\n")
     done = run("validate", faulty)
     assert done.code == 2 and "did you mean 'ignore'?" in done.err
+
+
+@pytest.mark.parametrize(("name", "text"), [("no.osim", "hello"), ("torn.osim", "<a><b></a>"), ("t.sto", "x\n")])
+def test_diff_of_what_cannot_be_read_is_exit_2_with_the_place(name, text, tmp_path):
+    (tmp_path / name).write_text(text)
+    done = run("validate", tmp_path / name, "--diff")
+    assert done.code == 2
+    assert f"{tmp_path / name}:1:" in done.err
