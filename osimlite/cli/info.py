@@ -50,7 +50,9 @@ def info(
         Facts(rows=rows).show()
         _classes([*model.walk()], everything)
         return
-    components = list(model.components())
+    tree = model.tree()
+    # What OpenSim makes for itself stands in no file.
+    components = [component for component in tree.components if not tree.is_internal(component)]
     muscles = [component for component in components if is_a(component, "Muscle")]
     wraps = [component for component in components if is_a(component, "PathWrap")]
     surfaces = sum(is_a(component, "WrapObject") for component in components)

@@ -132,3 +132,11 @@ def test_every_command_names_the_same_place_of_a_syntax_error(old, new, tmp_path
     assert (finding.line, finding.column) == (caught.value.line, caught.value.column)
     assert f"{path}:{finding.line}:{finding.column}: not well-formed XML" in run("info", path).err
     assert "only tags and values above line" in finding.message
+
+
+def test_components_are_counted_as_on_the_page():
+    from osimlite.view.inspect import component_tree
+
+    nodes, _ = component_tree(read(WALKER))
+    said = next(line for line in run("info", WALKER).out.splitlines() if line.startswith("components in all"))
+    assert said.split()[-1] == str(len(nodes))
