@@ -114,6 +114,20 @@ def expect_size(size: int, path: str | Path) -> int:
     return limit
 
 
+def expect_folder_of(path: str | Path) -> None:
+    """Say before long work that a file cannot be written because its folder is not there.
+
+    Raises:
+        MissingFolderError: it is not.
+    """
+    if not Path(os.path.realpath(path)).parent.is_dir():
+        raise _nowhere(path)
+
+
+def _nowhere(path: str | Path) -> MissingFolderError:
+    return MissingFolderError("cannot write here: the folder does not exist", file=str(path))
+
+
 def write_atomically(path: str | Path, content: str | bytes) -> None:
     """Write a file beside its place and move it there.
 
@@ -155,7 +169,7 @@ def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
         handle, name = mkstemp(dir=target.parent, prefix=".osimlite-")
     except OSError as error:
         if isinstance(error, FileNotFoundError):
-            raise MissingFolderError("cannot write here: the folder does not exist", file=str(target)) from None
+            raise _nowhere(target) from None
         raise OsimliteError(f"cannot write here: {error.strerror}", file=str(target)) from None
     try:
         with os.fdopen(handle, "wb") as stream:

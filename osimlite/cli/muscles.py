@@ -62,12 +62,15 @@ def muscles(
     from osimlite.cli._progress import progress_bar
     from osimlite.document.reader import read
     from osimlite.errors import ModelError, SettingError
+    from osimlite.files import expect_folder_of
     from osimlite.multibody import build_mechanism
     from osimlite.simulation.muscle_curves import muscle_curves
     from osimlite.text import listed
 
     if output is not None and output.suffix not in (".csv", ".parquet"):
         raise SettingError(f"a table of muscles is written as .csv or .parquet, not '{output.name}'")
+    if output is not None:
+        expect_folder_of(output)
     if len(coordinate or ()) > 2:
         raise SettingError("muscles are told over one coordinate or two")
     if plot and not coordinate:

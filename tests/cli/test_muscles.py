@@ -114,3 +114,10 @@ def test_a_muscle_without_equilibrium_hides_no_other(file):
     assert curves.muscles == ("/forceset/mu", "/forceset/slack")
     assert np.isfinite(curves.columns["tendon_force"][:, 0]).all()
     assert (curves.columns["length"] > 0.3).all()
+
+
+def test_a_folder_that_is_not_there_is_told_before_the_work(file, tmp_path):
+    # The model is not even read: there is none.
+    done = run("muscles", tmp_path / "none.osim", "-o", tmp_path / "nowhere" / "m.csv")
+    assert done.code == 2
+    assert "cannot write here: the folder does not exist" in done.err
