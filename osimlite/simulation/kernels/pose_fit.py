@@ -54,6 +54,8 @@ VAGUE, ALIKE = 1e-7, 1e-7
 others follow, so that this is not so."""
 SMALL_STEPS = 1e-2
 """Damping of the first step where the way down is to be followed closely."""
+PATIENCE = 15
+"""After how many steps the whole second derivative is taken where poses look alike."""
 POSES = 2
 """How many poses are kept to go on from."""
 INWARDS = 0.3
@@ -278,7 +280,8 @@ def descend(
                 break
             before = length if damping == lightest else inf
             damping = max(0.1 * damping, lightest)
-            bends = damping < FIRST_DAMPING and lightest == LIGHTEST
+            # Where poses look alike the whole second derivative comes last: far from the best it leads astray.
+            bends = damping < FIRST_DAMPING and (lightest == LIGHTEST or steps >= PATIENCE)
         else:
             if length <= 10.0 * FINEST:
                 # No better pose can be told from this one.
