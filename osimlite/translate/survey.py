@@ -83,9 +83,10 @@ class _Survey:
         self._links()
         self._joints()
         for index, info in enumerate(self.robot.mechanism.coordinates):
-            found = self.tree.by_path[info.path]
-            assert isinstance(found, Coordinate)
-            self._coordinate(index, found, info.path)
+            found = self.tree.by_path.get(info.path)
+            # Those of a joint that OpenSim adds under a loose body stand in no file.
+            if isinstance(found, Coordinate):
+                self._coordinate(index, found, info.path)
         for link in self.robot.links:
             for kind, shapes in (("visual", link.visuals), ("collision", link.collisions)):
                 for shape in shapes:
@@ -114,6 +115,8 @@ class _Survey:
                 )
                 continue
             self.fidelity.translated[path] = f"link {link.name}"
+            if carriers.get(path, "/ground") not in (*self.tree.by_path, "/ground"):
+                self.note("loose-body", path, "a body without a joint", "free of ground, as in OpenSim", carriers[path])
             if len(link.bodies) > 1 and path != "/ground":
                 massless = " without its mass, for it does not move" if "/ground" in link.bodies else ""
                 merged = f"merged into link {link.name}{massless}"

@@ -116,6 +116,15 @@ def test_what_the_joints_cannot_say_is_told():
     assert kinds(free)["default-speed"] == ["/jointset/free/c2"]
 
 
+def test_a_body_without_a_joint_is_free():
+    model = osimlite.Model(name="loose")
+    model.add(osimlite.Body(name="ball", mass=1.0, inertia=(1, 1, 1, 0, 0, 0)))
+    exported = osimlite.to_urdf(model)
+    (told,) = [record for record in exported.fidelity.records if record.component == "/bodyset/ball"]
+    assert (told.kind, told.detail) == ("loose-body", "/jointset/free_ball")
+    assert exported.text.count('type="prismatic"') == 3
+
+
 def test_limits_locks_and_merging_on_demand():
     model = dynamic_walker()
     limited = ElementTree.fromstring(to_urdf(model, limits="range").text)
