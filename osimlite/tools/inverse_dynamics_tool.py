@@ -9,12 +9,16 @@ from osimlite.schema.tools.dynamics import InverseDynamicsTool
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.files.recorded import RecordedMotion, exclude_forces
 from osimlite.tools.job import Job
+from osimlite.tools.not_runnable import NotRunnable
 from osimlite.tools.outcome import Outcome
 
 
 def run(job: Job, outcome: Outcome) -> None:
-    """Compute the generalized forces, and the loads on bodies at joints that are asked for."""
+    """Compute the generalized forces."""
     setup: InverseDynamicsTool = job.setup
+    if setup.joints_to_report_body_forces:
+        told = "joints_to_report_body_forces asks for loads on bodies at joints, which are not computed yet"
+        raise NotRunnable(told, file=str(job.file))
     model = job.model()
     recorded = RecordedMotion.read(build_mechanism(model), job.needed("coordinates_file"))
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates

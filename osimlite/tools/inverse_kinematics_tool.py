@@ -9,7 +9,7 @@ from osimlite.fitting.marker_data import MarkerData
 from osimlite.schema.tools.inverse_kinematics import InverseKinematicsTool
 from osimlite.simulation.files.storage import read_sto
 from osimlite.tools.job import NONE, Job
-from osimlite.tools.outcome import DEGREES, UNITS, Outcome
+from osimlite.tools.outcome import UNITS, Outcome
 
 
 def run(job: Job, outcome: Outcome) -> None:
@@ -21,7 +21,7 @@ def run(job: Job, outcome: Outcome) -> None:
     times, count = motion.times, len(motion.times)
     if setup.output_motion_file.strip() not in NONE:
         names = [info.name for info in motion.mechanism.coordinates]
-        path, notes = job.result(setup.output_motion_file), f"{UNITS}\n{DEGREES}\n"
+        path, notes = job.result(setup.output_motion_file), f"\n{UNITS}"
         outcome.table(path, "Coordinates", times, names, motion.in_degrees, in_degrees=True, description=notes)
     if setup.report_errors:
         squares = motion.marker_errors**2

@@ -13,11 +13,11 @@ from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass, field
 from osimlite.simulation.files.storage import StoTable
 
-UNITS = "Units are S.I. units (second, meters, Newtons, ...)"
 DEGREES = (
     "If the header above contains a line with 'inDegrees', this indicates whether rotational values are in degrees "
-    "(yes) or radians (no)."
+    "(yes) or radians (no).\n"
 )
+UNITS = f"Units are S.I. units (second, meters, Newtons, ...)\n{DEGREES}"
 """What OpenSim says of its tables in their headers."""
 PRECISION = 8
 """Digits behind the point that OpenSim prints unless it is told otherwise."""
@@ -29,13 +29,13 @@ def printed(table: StoTable, description: str = "", precision: int = PRECISION) 
 
     Args:
         table: the table.
-        description: what stands before the end of the header, with its own line ends.
+        description: what stands before the end of the header; a line end is added.
         precision: digits behind the point.
     """
     yield f"{table.name}\nversion=1\nnRows={len(table.times)}\nnColumns={len(table.columns) + 1}\n"
     yield f"inDegrees={'yes' if table.in_degrees else 'no'}\n"
     if description:
-        yield f"\n{description}\n"
+        yield f"{description}\n"
     yield "endheader\n"
     yield "\t".join(("time", *table.columns)) + "\n"
     line = "\t".join([f"%{precision + _PADDING}.{precision}f"] * (len(table.columns) + 1)) + "\n"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from osimlite._load import module_name
 from osimlite.document.reader import read_any
-from osimlite.errors import DocumentError, UnsupportedError
+from osimlite.errors import DocumentError
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report, merged
 from osimlite.lint.engine import run as checked
@@ -20,6 +20,7 @@ from osimlite.lint.suffixes import is_table
 from osimlite.schema.registry import MODULES
 from osimlite.text import counted, listed
 from osimlite.tools.job import Job
+from osimlite.tools.not_runnable import NotRunnable
 from osimlite.tools.outcome import Outcome
 
 
@@ -65,12 +66,6 @@ def run(setup: str | Path, output: str | Path | None = None, *, check: bool = Tr
     tool.run(Job(top, file, None if output is None else Path(output)), outcome)
     outcome.write()
     return outcome
-
-
-class NotRunnable(UnsupportedError):
-    """A document is not of a tool that can be run."""
-
-    exit_code = 2
 
 
 def runnable() -> list[str]:

@@ -13,7 +13,8 @@ import numpy as np
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.simulation.files.storage import read_sto, write_sto
-from osimlite.tools.running import FaultySetup, NotRunnable
+from osimlite.tools.not_runnable import NotRunnable
+from osimlite.tools.running import FaultySetup
 from tests.cli.command import run
 
 SETUP = """<?xml version="1.0" encoding="UTF-8" ?>
@@ -92,10 +93,26 @@ def test_what_cannot_be_run_is_refused_by_name(setup: Path, tag: str) -> None:
     assert run("run", "setup.xml", folder=setup.parent).code == 2
 
 
+def test_an_analysis_that_cannot_be_computed_is_refused_before_anything_is_written(setup: Path) -> None:
+    analyses = "<AnalysisSet><objects><Kinematics name='K'/><{}/></objects></AnalysisSet>"
+    for analysis, said in (
+        ("StaticOptimization name='SO'", "'SO' is a StaticOptimization"),
+        ("JointReaction name='JR'", "'JR' is a JointReaction"),
+        ("PointKinematics name='P'><step_interval>3</step_interval></PointKinematics><Kinematics", "leaves rows out"),
+    ):
+        text = SETUP.replace("InverseDynamicsTool", "AnalyzeTool")
+        text = text.replace("</coordinates_file>", f"</coordinates_file>{analyses}")
+        setup.write_text(text.format(analysis))
+        with pytest.raises(NotRunnable, match=said):
+            osimlite.run(setup, check=False)
+    assert not (setup.parent / "results").exists()
+
+
 def test_times_and_files_that_mean_nothing(setup: Path) -> None:
     for old, new, said in (
         ("0.02 0.1", "0.1 0.02", "give the first time first"),
         ("walker.osim", "", "it names no model_file"),
+        ("<time_range>", "<joints_to_report_body_forces>ALL</joints_to_report_body_forces><time_range>", "not"),
     ):
         setup.write_text(SETUP.replace(old, new))
         with pytest.raises(OsimliteError, match=said):

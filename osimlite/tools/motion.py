@@ -1,0 +1,143 @@
+"""A motion under analysis: states of a model over time, and what is computed of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite.errors import SettingError
+from osimlite.multibody.kinematics import Kinematics
+from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
+from osimlite.schema.model import Model
+from osimlite.simulation.run import Simulation
+from osimlite.simulation.system import System
+from osimlite.text import did_you_mean
+from osimlite.tools.job import Job
+from osimlite.tools.outcome import Outcome
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """States of a model over time.
+
+    Attributes:
+        model: what moves.
+        simulation: that computes its forces and accelerations.
+        times: (t,), s.
+        states: (t, y), in the order of the simulation's engine.
+    """
+
+    model: Model
+    simulation: Simulation
+    times: Array
+    states: Array
+
+    @property
+    def mechanism(self) -> Any:
+        """The mechanism of the model."""
+        return self.simulation.mechanism
+
+    @property
+    def system(self) -> System:
+        """What the kernels find of the forces at a state."""
+        assert isinstance(self.simulation.engine, System)
+        return self.simulation.engine
+
+    @property
+    def moments(self) -> Iterator[tuple[float, list[float]]]:
+        """Each time with its state."""
+        return zip(self.times.tolist(), self.states.tolist(), strict=True)
+
+    @cached_property
+    def _histories(self) -> tuple[Array, Array]:
+        return self.simulation.state.histories(self.states.tolist())
+
+    @property
+    def values(self) -> Array:
+        """Of all coordinates in the mechanism's order (t, n), rad and m."""
+        return self._histories[0]
+
+    @property
+    def speeds(self) -> Array:
+        """Generalized speeds (t, n)."""
+        return self._histories[1]
+
+    @cached_property
+    def accelerations(self) -> Array:
+        """Derivatives of the speeds (t, n), by all that acts on the model."""
+        engine, count = self.simulation.engine, len(self.simulation.state.order)
+        found = np.zeros_like(self.values)
+        for row, (t, y) in zip(found, self.moments, strict=True):
+            row[list(self.simulation.state.order)] = engine.derivative(t, y)[count : 2 * count]
+        return found
+
+    @cached_property
+    def kinematics(self) -> list[Kinematics]:
+        """Where the bodies are and how they move at every time."""
+        rows = zip(self.values, self.speeds, self.times.tolist(), strict=True)
+        return [self.mechanism.at(q, u, t) for q, u, t in rows]
+
+    def chosen(self, wanted: Sequence[Any], names: Sequence[str], what: str) -> list[int]:
+        """Places of the names that an analysis asks for; "all" stands for all of them.
+
+        Raises:
+            SettingError: there is none of a name.
+        """
+        asked = [str(name) for name in wanted]
+        if "all" in asked:
+            return list(range(len(names)))
+        for name in asked:
+            if name not in names:
+                raise SettingError(f"there is no '{name}' for {what}{did_you_mean(name, names)}")
+        return [names.index(name) for name in asked]
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """Where the tables of an analysis go.
+
+    Attributes:
+        job: the setup.
+        outcome: that has them written.
+        name: of the analysis.
+        times: of all rows (t,), s.
+    """
+
+    job: Job
+    outcome: Outcome
+    name: str
+    times: Array
+
+    def add(
+        self,
+        suffix: str,
+        title: str,
+        columns: Sequence[str],
+        rows: Array,
+        *,
+        in_degrees: bool = False,
+        description: str = "",
+        of: str = "",
+    ) -> None:
+        """Have a table written, with the precision of the setup.
+
+        Args:
+            suffix: end of the file's name.
+            title: first line of the file.
+            columns: labels (m,).
+            rows: (t, m).
+            in_degrees: whether rotational values are in degrees.
+            description: what the header says besides.
+            of: what stands before the suffix in the file's name, if not the analysis alone.
+        """
+        setup = self.job.setup
+        path: Path = self.job.in_results(f"{setup.name}_{self.name}{of}_{suffix}.sto")
+        self.outcome.table(
+            path, title, self.times, columns, rows, in_degrees=in_degrees, description=description,
+            precision=setup.output_precision,
+        )  # fmt: skip

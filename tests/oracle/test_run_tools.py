@@ -1,0 +1,108 @@
+"""Setups of tools that are run here and by OpenSim, live: the same files, headers and columns, the same numbers."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.models.jumper import jumper
+from osimlite.schema.model import Model
+from osimlite.simulation.files.storage import read_sto, write_sto
+
+pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytestmark = pytest.mark.oracle
+
+SETUP = """<OpenSimDocument Version="40600">
+    <{tool} name="it">
+        <model_file>model.osim</model_file>
+        <results_directory>{results}</results_directory>
+        <coordinates_file>motion.mot</coordinates_file>
+        <lowpass_cutoff_frequency_for_coordinates>{cutoff}</lowpass_cutoff_frequency_for_coordinates>
+        {more}
+    </{tool}>
+</OpenSimDocument>
+"""
+ANALYSES = """
+        <output_precision>16</output_precision>
+        <initial_time>{start}</initial_time>
+        <final_time>0.2</final_time>
+        <solve_for_equilibrium_for_auxiliary_states>{equilibrium}</solve_for_equilibrium_for_auxiliary_states>
+        <AnalysisSet>
+            <objects>
+                <Kinematics name="K"/>
+                <BodyKinematics name="B"><in_degrees>false</in_degrees></BodyKinematics>
+                <PointKinematics name="P">
+                    <body_name>{body}</body_name>
+                    <point_name>tip</point_name>
+                    <point>0.1 0.02 0.03</point>
+                </PointKinematics>
+                <MuscleAnalysis name="M"/>
+                <ForceReporter name="F"/>
+            </objects>
+        </AnalysisSet>
+"""
+
+
+def real(corpus: Any, name: str) -> Path:
+    """The file of a real model."""
+    path: Path = next(model.path for model in corpus if model.id == name)
+    return path
+
+
+def both(folder: Path, model: Model, tool: str, more: str, cutoff: float = -1.0) -> tuple[Path, Path]:
+    """Where we and OpenSim have put the results of a tool on some motion of a model."""
+    osimlite.write(model, folder / "model.osim")
+    mechanism = osimlite.mechanism(model)
+    times = np.linspace(0.0, 0.5, 26)
+    rows = np.array([info.default_value + 0.15 * np.sin(5 * times + k) for k, info in enumerate(mechanism.coordinates)])
+    turns = [info.motion_type == "rotational" for info in mechanism.coordinates]
+    write_sto(
+        folder / "motion.mot", "motion", times, mechanism.coordinate_names,
+        np.where(turns, np.degrees(rows.T), rows.T).tolist(), in_degrees=True,
+    )  # fmt: skip
+    for results in ("ours", "theirs"):
+        (folder / f"{results}.xml").write_text(SETUP.format(tool=tool, results=results, cutoff=cutoff, more=more))
+    script = f"import opensim; opensim.Logger.setLevelString('Error'); assert opensim.{tool}('theirs.xml').run()"
+    subprocess.run([sys.executable, "-c", script], cwd=folder, check=True, capture_output=True, timeout=100)
+    osimlite.run(folder / "ours.xml")
+    return folder / "ours", folder / "theirs"
+
+
+def compare(ours: Path, theirs: Path, tolerance: float, small: float = 1e-11) -> None:
+    """All files are there, with the same words and numbers that differ by parts of the largest of their columns."""
+    assert sorted(path.name for path in ours.iterdir()) == sorted(path.name for path in theirs.iterdir())
+    for file in ours.iterdir():
+        one, two = (path.read_text().partition("endheader\n") for path in (file, theirs / file.name))
+        assert (one[0], one[2].partition("\n")[0]) == (two[0], two[2].partition("\n")[0]), file.name
+        mine, known = read_sto(file), read_sto(theirs / file.name)
+        assert mine.times.tolist() == known.times.tolist()
+        largest = np.abs(known.rows).max(axis=0)
+        assert (np.abs(mine.rows - known.rows).max(axis=0) <= tolerance * largest + small).all(), file.name
+
+
+@pytest.mark.parametrize(("start", "cutoff", "equilibrium"), [(0.1, -1.0, "false"), (-0.05, 6.0, "true")])
+@pytest.mark.parametrize("name", ["arm26", "jumper"])
+def test_analyses(
+    corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, start: float, cutoff: float,
+    equilibrium: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    model = jumper() if name == "jumper" else osimlite.read(real(corpus, "m0001"))
+    body = model.body_set.objects[-1].name
+    more = ANALYSES.format(start=start, equilibrium=equilibrium, body=body)
+    # Muscles in equilibrium hardly move their fibers: what is left of that is rounding.
+    compare(*both(tmp_path, model, "AnalyzeTool", more, cutoff), 1e-8, 1e-8)
+
+
+@pytest.mark.parametrize("cutoff", [-1.0, 6.0])
+def test_inverse_dynamics(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cutoff: float) -> None:
+    monkeypatch.chdir(tmp_path)
+    model = osimlite.read(real(corpus, "m0001"))
+    more = "<forces_to_exclude>Muscles</forces_to_exclude>"
+    compare(*both(tmp_path, model, "InverseDynamicsTool", more, cutoff), 1e-8, 1.5e-8)
