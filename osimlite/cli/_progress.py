@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -88,14 +89,28 @@ def tell_of_compiling() -> None:
 
     logging.getLogger("osimlite.simulation.engines.linking").addHandler(Said())
 
-    class Once(logging.Handler):
+    bar = ExitStack()
+    # Whatever ends the program, the terminal gets its cursor back.
+    atexit.register(bar.close)
+
+    class Part(logging.Handler):
+        is_told, advance = False, staticmethod(_silent)
+
         def emit(self, record: logging.LogRecord) -> None:
-            log.removeHandler(self)
-            complain("compiling the engine, which this machine keeps; it takes some ten seconds")
+            part: float = record.__dict__["part"]
+            if not self.is_told:
+                complain("compiling the engine, which this machine keeps; it takes some ten seconds")
+            if self.advance is _silent:
+                self.advance = bar.enter_context(progress_bar("compiling the engine", 1.0))
+            self.is_told = True
+            self.advance(part)
+            if part >= 1.0:
+                bar.close()
+                self.advance = _silent
 
     log = logging.getLogger("osimlite.simulation.engines.machine_code")
     log.setLevel(logging.INFO)
-    log.addHandler(Once())
+    log.addHandler(Part())
 
 
 def _silent(*_: float) -> None:

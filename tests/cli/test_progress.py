@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import os
 import subprocess
 import sys
@@ -36,6 +37,21 @@ def test_bar(monkeypatch, stream, second, shows):
     # Two calls within a tenth of a second draw once.
     assert "75 %" not in text
     assert shows or not text
+
+
+def test_who_waits_for_the_compiler_sees_how_far_it_is(monkeypatch):
+    clock = iter((0.0, 0.1, 1.5, 3.0))
+    monkeypatch.setattr(_progress, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    log = logging.getLogger("osimlite.simulation.engines.machine_code")
+    monkeypatch.setattr(log, "handlers", [])
+    monkeypatch.setattr(log, "level", log.level)
+    _progress.tell_of_compiling()
+    for part in (0.0, 0.25, 1.0):
+        log.info("a law", extra={"part": part})
+    text = sys.stderr.getvalue()
+    assert text.count("it takes some ten seconds") == 1 and "25 %" in text and "100 %" in text
 
 
 @pytest.mark.parametrize("is_terminal", [True, False])

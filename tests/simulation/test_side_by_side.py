@@ -54,7 +54,7 @@ def test_shares():
     laws = list(LAW_MODULES)
     groups = side_by_side.shares(laws, 4)
     assert len(groups) == 4 and sorted(chain(*groups)) == sorted(laws)
-    sizes = [sum(map(side_by_side._size, group)) for group in groups]
+    sizes = [sum(map(side_by_side.size_of, group)) for group in groups]
     assert max(sizes) < 1.3 * min(sizes)
     # Little is not worth a process, and nobody gets nothing.
     assert side_by_side.shares(LAWS, 4) == [list(LAWS)]

@@ -35,21 +35,29 @@ def make_ready(names: Sequence[str]) -> None:
     missing = [name for name in names if not is_at_hand(name)]
     if not missing:
         return
-    from osimlite.simulation.engines.side_by_side import Helper, compilers, made, shares
+    from osimlite.simulation.engines.side_by_side import Helper, compilers, made, shares, size_of
+
+    whole, done = sum(map(size_of, missing)), 0
+
+    def keep(law: Made) -> None:
+        nonlocal done
+        _keep(law)
+        done += size_of(law.name)
+        _log.info("compiled '%s'", law.name, extra={"part": done / whole})
 
     for name in missing:
-        _log.info("compiling '%s'", name)
+        _log.info("compiling '%s'", name, extra={"part": 0.0})
     own, *others = shares(missing, compilers())
     with ExitStack() as stack:
         helpers = [stack.enter_context(Helper(share)) for share in others]
         for name in own:
-            _keep(made(name))
+            keep(made(name))
         for helper in helpers:
             for found in helper.found():
-                _keep(found)
+                keep(found)
     for name in missing:
         if name not in _addresses:
-            _keep(made(name))
+            keep(made(name))
 
 
 def is_at_hand(name: str) -> bool:

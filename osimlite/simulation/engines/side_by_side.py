@@ -35,14 +35,15 @@ class Made(NamedTuple):
 
 def shares(names: Sequence[str], cores: int) -> list[list[str]]:
     """Laws in groups that take about equally long to compile, for at most so many processes."""
-    sizes = {name: _size(name) for name in names}
+    sizes = {name: size_of(name) for name in names}
     groups: list[list[str]] = [[] for _ in range(max(1, min(cores, sum(sizes.values()) // SHARE)))]
     for name in sorted(names, key=lambda name: -sizes[name]):
         min(groups, key=lambda group: sum(sizes[item] for item in group)).append(name)
     return groups
 
 
-def _size(name: str) -> int:
+def size_of(name: str) -> int:
+    """Python code (bytes) of a law: about as long it takes to compile."""
     return sum(len(part.__code__.co_code) for part in functions_within(law_function(name)))
 
 
