@@ -118,14 +118,14 @@ def expect_folder_of(path: str | Path) -> None:
     """Say before long work that a file cannot be written because its folder is not there.
 
     Raises:
-        MissingFolderError: it is not.
+        OsimliteError: it is not.
     """
     if not Path(os.path.realpath(path)).parent.is_dir():
         raise _nowhere(path)
 
 
-def _nowhere(path: str | Path) -> MissingFolderError:
-    return MissingFolderError("cannot write here: the folder does not exist", file=str(path))
+def _nowhere(path: str | Path) -> OsimliteError:
+    return OsimliteError("cannot write here: the folder does not exist", file=str(path))
 
 
 def write_atomically(path: str | Path, content: str | bytes) -> None:

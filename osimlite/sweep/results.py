@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite._require import require
-from osimlite.errors import MissingFolderError, OsimliteError, SettingError
+from osimlite.errors import OsimliteError, SettingError
 from osimlite.files import no_such, put_in_place
 from osimlite.simulation.interrupts import defer_sigint
 from osimlite.text import counted, listed
@@ -294,7 +294,7 @@ def _locked(path: Path) -> Any:
     filelock = require("filelock", extra="sweep", purpose="a table of results")
     if not path.parent.is_dir():
         # The lock would make the folder.
-        raise MissingFolderError("cannot write here: the folder does not exist", file=str(path))
+        raise OsimliteError("cannot write here: the folder does not exist", file=str(path))
     lock = filelock.FileLock(path.with_name(f"{path.name}.lock"), thread_local=False)
     try:
         lock.acquire(blocking=False)
