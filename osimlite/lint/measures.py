@@ -223,11 +223,12 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
     except NotYetError as error:
         subject.is_unsettled = True
         return error.message
-    except OsimliteError as error:
-        return error.message
-    except (ArithmeticError, ValueError) as error:
+    except (ArithmeticError, ValueError, OsimliteError) as error:
+        fault = error.__context__ if isinstance(error, OsimliteError) else error
+        if not isinstance(fault, ArithmeticError | ValueError):
+            return str(getattr(error, "message", error))
         # Numbers that other rules have something to say of.
-        return f"a number of it is beyond what can be computed with ({error})"
+        return f"a number of it is beyond what can be computed with ({fault})"
     subject.kept[MEASURES] = found
     if parts is not None:
         remember(parts, found, subject.kept_in)

@@ -101,7 +101,9 @@ class ControlledSteps(Stepper):
         """The same as of the base as an array."""
         batch = self._batch(times, times[-1])
         try:
-            for step in self._calls(batch):
+            # Whoever looks on is told soon, and often at first.
+            first = FIRST_STEPS if progress is not None else _at_once.get(self._engine, FIRST_STEPS)
+            for step in self._calls(batch, first):
                 if progress is not None:
                     progress(self.time, step)
         except (KeyboardInterrupt, SimulationError) as ended:
@@ -141,15 +143,15 @@ class ControlledSteps(Stepper):
         batch.reports[0, : bisect_right(times, self.time)] = self.state
         return batch
 
-    def _calls(self, batch: Batch) -> Iterator[float]:
-        """Take steps until the last report is made; yields the mean length of the steps of each call, s."""
-        ending, engine = record.FULL, self._engine
+    def _calls(self, batch: Batch, steps: int) -> Iterator[float]:
+        """Take steps until the last report is made, so many first; yields their mean length in each call, s."""
+        ending = record.FULL
         while ending == record.FULL:
-            started, before, taken, steps = perf_counter(), self.time, self.taken, _at_once.get(engine, FIRST_STEPS)
+            started, before, taken = perf_counter(), self.time, self.taken
             ending = self._call(batch, steps)
             # As many as the time allows, but not many more than were tried.
             more = min(8.0 * steps, (self.taken - taken) * CALL_SECONDS / (perf_counter() - started))
-            _at_once[engine] = min(max(1, int(more)), LOGGED_STEPS)
+            steps = _at_once[self._engine] = min(max(1, int(more)), LOGGED_STEPS)
             yield (self.time - before) / max(self.taken - taken, 1)
 
     def _call(self, batch: Batch, steps: int) -> int:
