@@ -41,10 +41,10 @@ def without_namespaces(data: bytes) -> bytes:
     """UTF-8 text in which no name has a colon; every character keeps its line and column."""
     pieces, done = [], 0
     hidden: list[tuple[int, int]] | None = None
-    found = [match.span() for match in _COLONS.finditer(data)]
+    result = [match.span() for match in _COLONS.finditer(data)]
     if b"xmlns" in data:
-        found = sorted([*found, *(match.span() for match in _NAMESPACE.finditer(data))])
-    for place, end in found:
+        result = sorted([*result, *(match.span() for match in _NAMESPACE.finditer(data))])
+    for place, end in result:
         tag = data.rfind(b"<", max(0, place - _WINDOW), place)
         so_far = data[tag:place] if end - place == 1 else data[tag:place].rstrip()
         if tag < 0 or _TAG_SO_FAR.fullmatch(so_far) is None:
@@ -61,13 +61,13 @@ def without_namespaces(data: bytes) -> bytes:
 
 def _hidden(data: bytes) -> list[tuple[int, int]]:
     """Where text stands that may look like a tag and is none, in order."""
-    found = []
+    result = []
     for opening, ending in _HIDING:
         place = data.find(opening)
         while place >= 0:
             end = data.find(ending, place)
             if end < 0:
                 break
-            found.append((place, end))
+            result.append((place, end))
             place = data.find(opening, end)
-    return sorted(found)
+    return sorted(result)

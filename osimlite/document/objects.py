@@ -109,17 +109,17 @@ class ObjectReader:
     def top(self, element: etree._Element, cls: type[Read]) -> Read:
         """Read the object of a document; only there may a ``<defaults>`` block stand."""
         block = element.find(DEFAULTS)
-        found: list[Object] = []
+        result: list[Object] = []
         if block is not None:
             start = self.count
             self.count += 2 + sum(size(node) for node in block.itersiblings(preceding=True) if is_element(node))
-            found = self._block(block)
+            result = self._block(block)
             self.count = start
         top = self.object(element, cls, skip=block)
         if isinstance(top, Model):
             self.home.model = top
-        if found:
-            layout_of(top).defaults = found
+        if result:
+            layout_of(top).defaults = result
         return top
 
     def object(
@@ -247,16 +247,16 @@ class ObjectReader:
         if not file or self.included is None:
             plain: Object = self.object(element, cls, name)
             return plain
-        found, number, known = self.included(str(file), cls), self.count, len(self.notes)
-        if isinstance(found, str):
+        result, number, known = self.included(str(file), cls), self.count, len(self.notes)
+        if isinstance(result, str):
             empty: Object = self.object(element, cls, name)
             self.notes[known:] = [
-                note._replace(why=found) if note.kind == "include" and note.number == number else note
+                note._replace(why=result) if note.kind == "include" and note.number == number else note
                 for note in self.notes[known:]
             ]
             return empty
         self.count += size(element)
-        item, include, notes = found
+        item, include, notes = result
         for part in item.walk():
             object.__setattr__(part, "_index", number)
             object.__setattr__(part, "_model", self.home)
@@ -353,18 +353,18 @@ class ObjectReader:
 
     def _block(self, block: etree._Element) -> list[Object]:
         """Read a ``<defaults>`` block; each object counts for those of its class that are read after it."""
-        found: list[Object] = []
+        result: list[Object] = []
         for child in block:
             if not is_element(child):
                 continue
             cls = class_for(as_written(child.tag))
             if cls is None:
-                found.append(self._unknown(child))
+                result.append(self._unknown(child))
                 continue
             item = self.object(child, cls)
             self.defaults.setdefault(cls, item)
-            found.append(item)
-        return found
+            result.append(item)
+        return result
 
     def _default(self, cls: type[Object], name: str) -> Any:
         """The value of a text property that the file does not give."""

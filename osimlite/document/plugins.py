@@ -77,10 +77,10 @@ def classes_in(*paths: str | PathLike[str]) -> dict[str, type[Object]]:
 
 @lru_cache(maxsize=16)
 def _declared(files: tuple[tuple[str, int | None], ...]) -> Mapping[str, type[Object]]:
-    found: dict[str, type[Object]] = {}
+    result: dict[str, type[Object]] = {}
     for path, _ in files:
-        _Declarations(path, found).build()
-    return found
+        _Declarations(path, result).build()
+    return result
 
 
 class _Declarations:
@@ -269,10 +269,10 @@ class _Declarations:
 
     def rows(self, entry: dict[str, Any], key: str, *words: str) -> list[Any]:
         """What a key lists; of abstract classes the catalogue lists their own."""
-        found = entry.get(key, entry.get(f"own_{key}", []))
-        if not isinstance(found, list):
+        result = entry.get(key, entry.get(f"own_{key}", []))
+        if not isinstance(result, list):
             raise self.error(f"'{key}' must be a list", *words, key)
-        return found
+        return result
 
     def mapping(self, value: Any, known: tuple[str, ...] | None, what: str, *words: str) -> dict[str, Any]:
         """A value that must be an object of JSON with keys that are known."""

@@ -83,12 +83,12 @@ class Document:
     @property
     def refusals(self) -> list[Refusal]:
         """Over what OpenSim fails when it brings a document of an older version up to date."""
-        found = [] if self.upgraded is None else self.upgraded.refusals
-        if not found:
+        result = [] if self.upgraded is None else self.upgraded.refusals
+        if not result:
             return []
         tops = (self.top, *(self.top.layout.defaults if self.top.layout is not None else ()))
         read = {item._index for top in tops for item in top.walk()}
-        return [refusal for refusal in found if refusal.owner in read]
+        return [refusal for refusal in result if refusal.owner in read]
 
     @property
     def changes(self) -> list[Change]:
@@ -322,8 +322,8 @@ def version_of(source: Source, root: etree._Element) -> int:
         message = f"the root element is <{tag}>, not <OpenSimDocument>: this is no OpenSim document"
         raise _meaning(source.fault(DocumentError, message, place), _root_meant(tag, root))
     if number is None:
-        found = "has no Version" if text is None else f'has Version="{text[:40]}", which is not a whole number'
-        raise source.fault(VersionError, f'<OpenSimDocument> {found}; write Version="{CURRENT_VERSION}"', place)
+        result = "has no Version" if text is None else f'has Version="{text[:40]}", which is not a whole number'
+        raise source.fault(VersionError, f'<OpenSimDocument> {result}; write Version="{CURRENT_VERSION}"', place)
     message = (
         f"document version {number} is none that OpenSim ever wrote (they begin at {OLDEST}); "
         f'write Version="{CURRENT_VERSION}" if the model is in the current format'

@@ -91,13 +91,13 @@ def read_repaired(
 
 def element_at(source: Source, offset: int) -> int:
     """The number of the innermost element around a character; 0, the root, outside all."""
-    found = 0
+    result = 0
     for number, span in enumerate(source.spans):
         if span.start > offset:
             break
         if offset < span.end:
-            found = number
-    return found
+            result = number
+    return result
 
 
 def repaired(text: str) -> tuple[str, list[Repair]]:
@@ -146,8 +146,8 @@ def _unended(text: str) -> int | None:
     place = 0
     for _, _, end, _ in markup(text):
         place = end
-    found = _SPECIAL.search(text, place)
-    return None if found is None else found.start()
+    result = _SPECIAL.search(text, place)
+    return None if result is None else result.start()
 
 
 def _blanked(text: str) -> str:
@@ -175,10 +175,10 @@ def _outside(text: str, offset: int, repairs: list[Repair]) -> str:
 def _comment(piece: str, offset: int, repairs: list[Repair]) -> str:
     """A comment may not have two hyphens in a row, nor end with one: dashes look the same."""
     inner = piece[4:-3]
-    found = _HYPHENS.search(inner)
-    if found is None:
+    result = _HYPHENS.search(inner)
+    if result is None:
         return piece
-    repairs.append(Repair("hyphens-in-comment", offset + 4 + found.start(), found[0], _EN_DASH * len(found[0])))
+    repairs.append(Repair("hyphens-in-comment", offset + 4 + result.start(), result[0], _EN_DASH * len(result[0])))
     return f"<!--{_HYPHENS.sub(lambda match: _EN_DASH * len(match[0]), inner)}-->"
 
 

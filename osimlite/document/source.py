@@ -93,11 +93,11 @@ class Source:
         """The attributes of an element by name."""
         if number not in self._attributes:
             span = self.spans[number]
-            found = self._attributes[number] = {}
+            result = self._attributes[number] = {}
             for match in ATTRIBUTE.finditer(self.text, span.start, span.tag_end):
                 before = span.start + len(self.text[span.start : match.start()].rstrip())
                 value = match["quoted"][1:-1]
-                found.setdefault(match["name"], Attribute(before, match.start(), match.end(), value))
+                result.setdefault(match["name"], Attribute(before, match.start(), match.end(), value))
         return self._attributes[number]
 
     @cached_property
@@ -141,8 +141,8 @@ class Source:
 
     def child(self, number: int, tag: str) -> int | None:
         """The number of the first element `tag` directly inside element `number`, or of what it was made from."""
-        found = next((child for child in self._inside(number) if self._tag(child) == tag), None)
-        return self.moved.get((number, tag)) if found is None else found
+        result = next((child for child in self._inside(number) if self._tag(child) == tag), None)
+        return self.moved.get((number, tag)) if result is None else result
 
     @cached_property
     def _line_starts(self) -> list[int]:
@@ -217,10 +217,10 @@ class Source:
 
     def of_attribute(self, number: int, name: str) -> Position:
         """Where the value of an attribute is; the tag if the element has no such attribute."""
-        found = self.attributes_of(number).get(name)
-        if found is None:
+        result = self.attributes_of(number).get(name)
+        if result is None:
             return self.of_tag(number)
-        return self.position(found.end - 1 - len(found.value), max(1, len(found.value)))
+        return self.position(result.end - 1 - len(result.value), max(1, len(result.value)))
 
 
 _MARKS = {

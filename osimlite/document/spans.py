@@ -57,10 +57,10 @@ def markup(text: str) -> Iterator[Markup]:
         place = match.end()
         if special is not None:
             kind, ending = _SPECIAL[special]
-            found = text.find(ending, place)
-            if found < 0:
+            result = text.find(ending, place)
+            if result < 0:
                 return
-            place = found + len(ending)
+            place = result + len(ending)
             yield Markup(kind, match.start(), place)
         elif match["close"] is not None:
             yield Markup("close", match.start(), place, match["close"])
@@ -99,10 +99,10 @@ def spans_of(text: str) -> list[Span]:
             ends.append(end)
         else:
             ending = _SPECIAL[match["special"]][1]
-            found = text.find(ending, end)
-            if found < 0:
+            result = text.find(ending, end)
+            if result < 0:
                 break
-            behind = found + len(ending)
+            behind = result + len(ending)
     return [*map(Span._make, zip(tags, starts, tag_ends, inner_ends, ends, strict=True))]
 
 
@@ -122,8 +122,8 @@ class PlainSpans(Sequence[Span]):
         self.text = text
         self.starts = [match.start() for match in _BEGIN.finditer(text)]
         if len(self.starts) != elements:
-            found = ((match.start(), match.end()) for match in _BEGIN_OR_HIDDEN.finditer(text))
-            self.starts = [start for start, end in found if end == start + 2]
+            result = ((match.start(), match.end()) for match in _BEGIN_OR_HIDDEN.finditer(text))
+            self.starts = [start for start, end in result if end == start + 2]
         self._known: dict[int, Span] = {}
 
     def __len__(self) -> int:

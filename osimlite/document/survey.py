@@ -47,19 +47,19 @@ def survey(source: Source, *, of: type[Object] = Model) -> Survey:
         except NotWellFormedError:
             return Survey(source, None, [fault])
     except DocumentError as fault:
-        found = Survey(source, None, [fault])
+        result = Survey(source, None, [fault])
         if fault.meant != ROOT:
-            return found
+            return result
         root = parse(source)
         root.tag = ROOT
-        return _assembled(found, root, of)
+        return _assembled(result, root, of)
 
 
 def _recovered(source: Source, fault: NotWellFormedError, of: type[Object]) -> Survey:
-    found = Survey(source, None, [fault], fault.line)
+    result = Survey(source, None, [fault], fault.line)
     unclosed = re.search(r"of line (\d+) is not closed", fault.message)
     if unclosed:
-        found.sure_until = int(unclosed[1])
+        result.sure_until = int(unclosed[1])
     try:
         # What the parser takes for a character in spite of all may be none that lxml can give back.
         from osimlite.document.repair import repaired
@@ -67,10 +67,10 @@ def _recovered(source: Source, fault: NotWellFormedError, of: type[Object]) -> S
         mended, _ = repaired(source.text)
         root = parse(Source(mended.encode("utf-8", "replace"), source.file), recover=True)
     except NotWellFormedError:
-        return found
-    if root.tag != ROOT or not _same_elements(source, root, found.sure_until):
-        return found
-    return _assembled(found, root, of)
+        return result
+    if root.tag != ROOT or not _same_elements(source, root, result.sure_until):
+        return result
+    return _assembled(result, root, of)
 
 
 def _assembled(found: Survey, root: etree._Element, of: type[Object]) -> Survey:

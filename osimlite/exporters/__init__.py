@@ -42,6 +42,6 @@ class Exporter:
 @cache
 def exporters(command: str) -> dict[str, Exporter]:
     """The exporters of a command by name, the usual one first."""
-    found = [import_module(f"{__name__}.{module.name}").EXPORTER for module in iter_modules(__path__)]
-    found.sort(key=lambda each: not each.usual)
-    return {each.name: each for each in found if each.command == command}
+    result = [import_module(f"{__name__}.{module.name}").EXPORTER for module in iter_modules(__path__)]
+    result.sort(key=lambda each: not each.usual)
+    return {each.name: each for each in result if each.command == command}

@@ -54,12 +54,12 @@ def axes_refused(joint: CustomJoint) -> bool:
     if not names:
         return bool(declared)
     made = list(declared)
-    for place, name in enumerate(names):
+    for index, name in enumerate(names):
         if name not in made:
-            if len(made) != place or any(character in name for character in ILLEGAL_CHARACTERS):
+            if len(made) != index or any(character in name for character in ILLEGAL_CHARACTERS):
                 return True
             made.append(name)
-    moved = any(names.index(name) != place for place, name in enumerate(declared) if name in names)
+    moved = any(names.index(name) != index for index, name in enumerate(declared) if name in names)
     return moved and len(declared) != len(names)
 
 

@@ -110,8 +110,8 @@ class Cache:
         # Many models share their meshes.
         if path not in self._stamps:
             try:
-                found = os.stat(path)
-                self._stamps[path] = found.st_mtime_ns, found.st_size
+                result = os.stat(path)
+                self._stamps[path] = result.st_mtime_ns, result.st_size
             except (OSError, ValueError):
                 self._stamps[path] = None
         return self._stamps[path]
@@ -146,8 +146,8 @@ def text_of(data: bytes) -> list[object]:
 
 def _own_stamp(file: str) -> list[int]:
     """What is another when a file has changed: its times, its size, and where it is on the disk."""
-    found = os.stat(file)
-    return [found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino]
+    result = os.stat(file)
+    return [result.st_mtime_ns, result.st_ctime_ns, result.st_size, result.st_ino]
 
 
 def _stamp_since(file: str, moment: int) -> list[int] | None:

@@ -320,7 +320,7 @@ def _not_ignored(
     kept = [finding for finding in findings if not _is_ignored(finding, comments)]
     unused = next(known for known in all_rules() if known.name == "unused-ignore")
     if subject.config.wants(unused):
-        found = Found({"": unused}, subject, kept)
+        result = Found({"": unused}, subject, kept)
         for comment in comments:
             for code in comment.codes:
                 named = [known for known in all_rules() if known.matches(code)]
@@ -328,7 +328,7 @@ def _not_ignored(
                 is_silent = any(known in left_out for known in named)
                 ran = not named or (any(map(subject.config.wants, named)) and not is_silent)
                 if code not in comment.used and ran:
-                    found(f"nothing is found here that '{code}' would ignore", at=comment.place)
+                    result(f"nothing is found here that '{code}' would ignore", at=comment.place)
             if not comment.codes:
-                found("this comment names no code to ignore", at=comment.place)
+                result("this comment names no code to ignore", at=comment.place)
     return kept

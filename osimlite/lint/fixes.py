@@ -53,8 +53,8 @@ def without_attribute(source: Source | None, number: int, name: str, *, safe: bo
     """Take an attribute out."""
     if source is None:
         return None
-    found = source.attributes_of(number).get(name)
-    return Fix((Edit(found.before, found.end, ""),), safe) if found else None
+    result = source.attributes_of(number).get(name)
+    return Fix((Edit(result.before, result.end, ""),), safe) if result else None
 
 
 def without_text(source: Source, start: int, end: int) -> Fix:

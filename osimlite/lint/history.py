@@ -60,7 +60,7 @@ def new_properties(cls: type[Object], release: str) -> list[NewProperty]:
     later = later_than(release).properties
     names = {spec: (f"{spec.declared_in.tag}.{tag}", f"{cls.tag}.{tag}") for tag, spec in field_specs(cls).items()}
     told = ((spec, later.get(base) or later.get(own)) for spec, (base, own) in names.items())
-    return [NewProperty(spec, found[0], "".join(found[1:])) for spec, found in told if found is not None]
+    return [NewProperty(spec, result[0], "".join(result[1:])) for spec, result in told if result is not None]
 
 
 def _numbers(release: str) -> tuple[int, ...]:

@@ -54,7 +54,7 @@ def check_files(
         MissingFileError: a file is missing or cannot be read.
         OsimliteError: the settings make no sense.
     """
-    found: dict[str, Report] = {}
+    result: dict[str, Report] = {}
     texts = Texts()
     jobs: list[Job] = []
     caches: dict[Path, Cache] = {}
@@ -62,7 +62,7 @@ def check_files(
         settings = settings_of(file)
         config = settings.config_for(file, given)
         if file == "-":
-            found[file] = _standard_input(config, texts)
+            result[file] = _standard_input(config, texts)
             continue
         job = Job(file, config, folder_for(settings.file) if cached else None)
         known = None
@@ -72,12 +72,12 @@ def check_files(
         if known is None:
             jobs.append(job)
         else:
-            found[file] = known
-    for count, (job, report) in enumerate(_checked(jobs, processes), len(found) + 1):
-        found[job.file] = report
+            result[file] = known
+    for count, (job, report) in enumerate(_checked(jobs, processes), len(result) + 1):
+        result[job.file] = report
         if progress is not None:
             progress(count, len(files))
-    whole = merged(found[file] for file in files)
+    whole = merged(result[file] for file in files)
     return replace(whole, texts=texts, checked=len(files))
 
 

@@ -219,7 +219,7 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
         may_wait = waits and subject.waits
         known_of = None if parts is None or known is None else (known.measures, known.of(parts))
         with lent(subject.tree):
-            found = measured(subject.model, compiles=compiles, waits=may_wait, known=known_of)
+            result = measured(subject.model, compiles=compiles, waits=may_wait, known=known_of)
     except NotYetError as error:
         subject.is_unsettled = True
         return error.message
@@ -229,9 +229,9 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
             return str(getattr(error, "message", error))
         # Numbers that other rules have something to say of.
         return f"a number of it is beyond what can be computed with ({fault})"
-    subject.kept[MEASURES] = found
+    subject.kept[MEASURES] = result
     if parts is not None:
-        remember(parts, found, subject.kept_in)
+        remember(parts, result, subject.kept_in)
     return ""
 
 

@@ -27,7 +27,7 @@ def is_ours(beginning: bytes) -> bool:
         return True
     open_tags: list[str] = []
     evidence: set[tuple[str, str]] = set()
-    for number, (closing, name, empty) in enumerate(found for found in _TAGS.findall(text) if found[1]):
+    for number, (closing, name, empty) in enumerate(result for result in _TAGS.findall(text) if result[1]):
         tag = name.rpartition(":")[2]
         if closing:
             while open_tags and open_tags.pop() != tag:
@@ -51,8 +51,8 @@ def misspelt(word: str, known: Iterable[str]) -> str | None:
 
     if len(word) < 8:
         return next((name for name in known if name.lower() == word.lower()), None)
-    found = extractOne(word, list(known), scorer=OSA.distance, processor=str.lower, score_cutoff=2)
-    return found[0] if found else None
+    result = extractOne(word, list(known), scorer=OSA.distance, processor=str.lower, score_cutoff=2)
+    return result[0] if result else None
 
 
 def is_root(tag: str) -> bool:
@@ -70,8 +70,8 @@ def _class_name(tag: str) -> str | None:
     from osimlite.schema.registry import MODULES
 
     known = {**{name: name for name in MODULES}, **RENAMED}
-    found = tag if tag in known else misspelt(tag, known)
-    return None if found is None else known[found]
+    result = tag if tag in known else misspelt(tag, known)
+    return None if result is None else known[result]
 
 
 @cache

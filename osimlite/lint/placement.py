@@ -189,15 +189,15 @@ def turning_axes(joint: Joint) -> list[tuple[str, Vector]]:
         for turn in axes_of(cast("CustomJoint", joint))[:3]:
             if len(turn.coordinates) == 1 and not isinstance(turn.function, Constant):
                 turns.append((str(turn.coordinates[0]), turn.axis, _along(turn, values, rough=False)))
-    found: dict[str, Vector] = {}
+    result: dict[str, Vector] = {}
     turned = Pose()
     for name, axis, angle in turns:
         length = math.sqrt(dot(axis, axis))
         if angle is None or name not in values or length == 0.0:
             return []
-        found[name] = turned.turned((axis[0] / length, axis[1] / length, axis[2] / length))
+        result[name] = turned.turned((axis[0] / length, axis[1] / length, axis[2] / length))
         turned = turned.then(about(axis, angle))
-    return list(found.items())
+    return list(result.items())
 
 
 def _custom(joint: CustomJoint, values: dict[str, float], *, rough: bool) -> Pose | None:

@@ -42,14 +42,14 @@ def marker_places(setup: Setup) -> dict[str, Vector]:
     """Where the markers of the model are in the default pose, in ground, m."""
     model = _model_of(setup)
     poses = poses_at(model, {})
-    found: dict[str, Vector] = {}
+    result: dict[str, Vector] = {}
     # What a set of markers adds has absolute paths.
     added = [item for _, top in setup.added for item in top.walk() if is_a(item, "Marker")]
     for marker in (*model.named("Marker"), *added):
         frame = on_base(model, model.tree.walk(str(marker.socket_parent_frame), "/markerset", "Frame").target)
         if frame is not None and id(frame[0]) in poses:
-            found[marker.name] = poses[id(frame[0])].then(frame[1]).of(marker.location)
-    return found
+            result[marker.name] = poses[id(frame[0])].then(frame[1]).of(marker.location)
+    return result
 
 
 @once

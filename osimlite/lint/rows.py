@@ -54,10 +54,10 @@ class Rows:
 
     def of(self, *kinds: str) -> list[Fault]:
         """The faults of some kinds, by place; of very many the first."""
-        found = sorted((fault for fault in self.faults.values() if fault.kind in kinds), key=lambda fault: fault.line)
-        if len(found) > _TOLD:
-            found[_TOLD - 1 :] = [found[_TOLD - 1]._replace(others=len(found) - _TOLD)]
-        return found
+        result = sorted((fault for fault in self.faults.values() if fault.kind in kinds), key=lambda fault: fault.line)
+        if len(result) > _TOLD:
+            result[_TOLD - 1 :] = [result[_TOLD - 1]._replace(others=len(result) - _TOLD)]
+        return result
 
     def line_of(self, row: int) -> int:
         """The line of the file that holds a row, as both are counted from 0 and 1."""

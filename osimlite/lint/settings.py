@@ -71,8 +71,8 @@ def settings_for(folder: Path) -> Settings:
     Raises:
         OsimliteError: the file is no TOML, or has a setting that does not exist or makes no sense.
     """
-    found = settings_table(folder)
-    return Settings() if found is None else _settings(*found)
+    result = settings_table(folder)
+    return Settings() if result is None else _settings(*result)
 
 
 def _settings(file: Path, table: dict[str, Any]) -> Settings:

@@ -73,10 +73,10 @@ class Setup(Subject):
     @cached_property
     def by_class(self) -> dict[type[Object], list[Object]]:
         """Every object by its exact class."""
-        found: dict[type[Object], list[Object]] = {}
+        result: dict[type[Object], list[Object]] = {}
         for item in self.items:
-            found.setdefault(type(item), []).append(item)
-        return found
+            result.setdefault(type(item), []).append(item)
+        return result
 
     @cached_property
     def own(self) -> list[Object]:
@@ -142,15 +142,15 @@ class Setup(Subject):
         return self._tools_in([here, here.parent, *folders_in(here), *folders_in(here.parent)])
 
     def _tools_in(self, folders: Iterable[Path]) -> list[tuple[str, Object]]:
-        found = []
+        result = []
         for folder in dict.fromkeys(folders):
             self._looked_at[str(folder)] = None
             for file in (documents_of(str(folder)) or [])[:_MOST_NEIGHBOURS]:
                 top = top_at(file) if _NAMES_MODEL.search(beginning(file)) else None
                 if top is not None and _model_named_by(top) is not None:
-                    found.append((file, top))
+                    result.append((file, top))
                     self._looked_at[file] = None
-        return found
+        return result
 
     @cached_property
     def tool(self) -> tuple[str, Object] | None:
@@ -191,7 +191,7 @@ class Setup(Subject):
     @cached_property
     def uses(self) -> list[Use]:
         """Every name that stands in the document, of a component or of something else."""
-        found: list[Use] = []
+        result: list[Use] = []
         named: dict[int, Reference | None] = {}
         for item in self.own:
             cls = type(item)
@@ -199,7 +199,7 @@ class Setup(Subject):
             owner: Any = item if self.tree is None else self.tree.model
             names = named.get(id(item))
             if item.name and (names is not None or cls.name_reference is not None):
-                found.append(Use(item, owner, name_spec(cls, names), item.name))
+                result.append(Use(item, owner, name_spec(cls, names), item.name))
             for spec in member_specs(cls):
                 held = getattr(item, spec.name)
                 members = held if isinstance(held, list) else getattr(held, "objects", ())
@@ -209,10 +209,10 @@ class Setup(Subject):
                     spec = spec._replace(kind=names)
                 value = getattr(item, spec.name)
                 if isinstance(value, tuple):
-                    found += [Use(item, owner, spec, word, position) for position, word in enumerate(value)]
+                    result += [Use(item, owner, spec, word, position) for position, word in enumerate(value)]
                 elif value:
-                    found.append(Use(item, owner, spec, value))
-        return found
+                    result.append(Use(item, owner, spec, value))
+        return result
 
     def table_of_tool(self, name: str) -> Table | None:
         """A table that the tool names."""

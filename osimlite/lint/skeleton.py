@@ -115,7 +115,7 @@ def growth(subject: Subject) -> Growth:
 
 def _fails(subject: Subject, edges: list[_Edge], order: dict[str, _Edge]) -> bool:
     paths = [*order]
-    last = max(place for place, edge in enumerate(order.values()) if edge.link is None)
+    last = max(index for index, edge in enumerate(order.values()) if edge.link is None)
     late = {*paths[:last]}
     frames = chain(subject.named("PhysicalOffsetFrame"), subject.named("StationDefinedFrame"))
     framed = {subject.path(base) for frame in frames if (base := base_of(subject, frame)) is not None}

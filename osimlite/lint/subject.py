@@ -123,11 +123,11 @@ class Subject(Checked):
 
         Dozens of rules ask for the objects of a class, and most models have none of it.
         """
-        found: dict[str, list[list[Object]]] = {}
+        result: dict[str, list[list[Object]]] = {}
         for cls, items in self.by_class.items():
             for name in lineage(cls):
-                found.setdefault(name, []).append(items)
-        return found
+                result.setdefault(name, []).append(items)
+        return result
 
     def each(self, cls: type[T]) -> Iterator[T]:
         """Every object of a class or of one derived from it."""
@@ -270,18 +270,18 @@ class Subject(Checked):
         # OpenSim looks for data files in the working folder as well.
         places = [os.path.abspath(folder / place) for place in (".", "Geometry", *self.config.mesh_paths)]
         places.append(os.getcwd())
-        found: dict[str, None] = {}
+        result: dict[str, None] = {}
         for cls, items in self.by_class.items():
             for spec in file_specs(cls, "file"):
                 for item in items:
                     name = getattr(item, spec.name)
                     if name:
                         paths = [os.path.join(place, name) for place in places]
-                        found |= dict.fromkeys(paths)
+                        result |= dict.fromkeys(paths)
                         if not any(map(os.path.isfile, paths)):
                             # Another file in the same folder may be what was meant.
-                            found |= dict.fromkeys(map(os.path.dirname, paths))
-        return list(found)
+                            result |= dict.fromkeys(map(os.path.dirname, paths))
+        return list(result)
 
     def names_itself(self, item: Object) -> bool:
         """Whether the text gives an object its name; always true of a model made in Python."""
@@ -295,8 +295,8 @@ class Subject(Checked):
         """Where the name of an attribute stands."""
         if self.source is None:
             return None
-        found = self.source.attributes_of(number).get(name)
-        return self.source.position(found.start, len(name)) if found else self.source.of_tag(number)
+        result = self.source.attributes_of(number).get(name)
+        return self.source.position(result.start, len(name)) if result else self.source.of_tag(number)
 
     def _given(self, item: Object | None) -> int | None:
         """The element of an object; of one the text does not give, that of the component above it."""

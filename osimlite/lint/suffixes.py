@@ -43,7 +43,7 @@ def project_files(
         MissingFileError: a path is not there; MissingFolderError of one that ends as those of folders do.
         OsimliteError: there is none in a folder.
     """
-    found: list[str] = []
+    result: list[str] = []
     others: list[str] = [] if passed is None else passed
     for path in paths:
         if os.path.isdir(path):
@@ -55,15 +55,15 @@ def project_files(
                     f"there is no file of OpenSim in this folder: no {', '.join(suffixes[:-1])} or {suffixes[-1]}",
                     file=str(path),
                 )
-            found += below
+            result += below
             others += sorted({*inside}.difference(below))
         elif str(path) != "-" and not os.path.lexists(path) and os.path.realpath(path) not in unsaved:
             raise no_such(path, may_be_folder=True)
         elif not only_ours or begins_as_ours(str(path)):
-            found.append(str(path))
+            result.append(str(path))
         else:
             others.append(str(path))
-    return list({os.path.abspath(file): file for file in reversed(found)}.values())[::-1]
+    return list({os.path.abspath(file): file for file in reversed(result)}.values())[::-1]
 
 
 def begins_as_ours(file: str) -> bool:

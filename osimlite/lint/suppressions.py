@@ -47,7 +47,7 @@ def suppressions(source: Source) -> list[Suppression]:
     """
     if "osimlite:" not in source.text:
         return []
-    found = []
+    result = []
     root = source.spans[0].start if source.spans else len(source.text)
     for match in _COMMENT.finditer(source.text):
         place = source.position(match.start(), match.end() - match.start())
@@ -59,18 +59,18 @@ def suppressions(source: Source) -> list[Suppression]:
             following = next((span for span in source.spans if span.start >= match.end()), None)
             if following is not None:
                 last = source.position(following.end - 1).line
-        found.append(Suppression(place, _codes(match[1]), first, last))
-    return found
+        result.append(Suppression(place, _codes(match[1]), first, last))
+    return result
 
 
 def suppressions_in_header(lines: list[str]) -> list[Suppression]:
     """Every ignoring line in the header of a storage file, which OpenSim passes over; it speaks of the whole file."""
-    found = []
+    result = []
     for number, line in enumerate(lines, 1):
         match = _LINE.match(line)
         if match:
-            found.append(Suppression(Position(number, 1, match.end()), _codes(match[1]), 1, LAST_LINE))
-    return found
+            result.append(Suppression(Position(number, 1, match.end()), _codes(match[1]), 1, LAST_LINE))
+    return result
 
 
 def _codes(text: str) -> tuple[str, ...]:

@@ -127,8 +127,8 @@ class Table(Checked):
         start = self.line_start(line)
         text = self.data[start : self.line_start(2, start)]
         first, *rest = islice(_CELL.finditer(text), 2)
-        found = rest[0] if self.is_markers else first
-        return Position(line, found.start() + 1, len(found[0]))
+        result = rest[0] if self.is_markers else first
+        return Position(line, result.start() + 1, len(result[0]))
 
     def suppressions(self) -> list[Suppression]:
         """The lines of the header that ignore findings; a marker file cannot have any."""

@@ -145,12 +145,12 @@ class Analysis:
     def objects(self) -> dict[int, Object]:
         """The objects of the document by the number of their element."""
         top = None if self.document is None else self.document.top
-        found: dict[int, Object] = {}
+        result: dict[int, Object] = {}
         for item in top.walk() if top is not None else ():
             if item._index is not None:
                 # What is read from another file has the number of the element that names that.
-                found.setdefault(item._index, item)
-        return found
+                result.setdefault(item._index, item)
+        return result
 
     def span(self, number: int) -> Span:
         """Where an element stands."""
@@ -163,12 +163,12 @@ class Analysis:
     @cached_property
     def places(self) -> list[tuple[Use, int, int]]:
         """Every reference that stands in the text, with the offsets of the beginning and the end of its word."""
-        found = []
+        result = []
         for use in () if self.document is None else self.document.uses:
             place = self._place(use)
             if place is not None:
-                found.append((use, *place))
-        return found
+                result.append((use, *place))
+        return result
 
     def _place(self, use: Use) -> tuple[int, int] | None:
         number = use.holder._index
@@ -234,12 +234,12 @@ class Analysis:
             return next((Target(str(table.file), at=at) for at in labels), None) if table is not None else None
         if self.tree is None:
             return None
-        found = named_by(self.tree, use)
+        result = named_by(self.tree, use)
         if setup is None:
-            return None if found is None else self._target(self.file, found)
-        if found is not None and setup.tool is not None:
+            return None if result is None else self._target(self.file, result)
+        if result is not None and setup.tool is not None:
             # A study may hold its model itself.
-            return self._target(setup.model_file or setup.tool[0], found)
+            return self._target(setup.model_file or setup.tool[0], result)
         named = ((file, item) for file, top in setup.added for item in top.walk() if item.name == text)
         return next((Target(*one, number=one[1]._index) for one in named if is_a(one[1], use.reference.target)), None)
 

@@ -124,8 +124,8 @@ def _in_text(text: str, offset: int, behind: int, around: tuple[Element, ...]) -
 
 def _end_of_tag(text: str, start: int) -> int:
     """Behind a tag, or where the next markup begins if it has no end."""
-    found = re.compile(r"[<>]").search(text, start + 1)
-    return len(text) if found is None else found.end() if found[0] == ">" else found.start()
+    result = re.compile(r"[<>]").search(text, start + 1)
+    return len(text) if result is None else result.end() if result[0] == ">" else result.start()
 
 
 def _close(stack: list[Element], piece: Markup) -> None:
@@ -152,8 +152,8 @@ def _meaning(around: Element | None, tag: str, name: str) -> tuple[type[Object] 
         return class_for(tag), around.spec
     spec = field_specs(around.cls).get(tag)
     if spec is None:
-        found = class_for(tag)
-        return found, None if found is None else _holder(around.cls, found, name)
+        result = class_for(tag)
+        return result, None if result is None else _holder(around.cls, result, name)
     if isinstance(spec.kind, Held) and spec.kind.form == "unnamed":
         return spec.accepts, spec
     return None, spec

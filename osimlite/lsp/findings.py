@@ -50,10 +50,10 @@ def _offsets(analysis: Analysis, finding: Finding) -> tuple[int, int]:
 
 def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.CodeAction]:
     """What can be done about the findings in a range: their mends, and to ignore them; and to mend all of the file."""
-    found: list[types.CodeAction] = []
+    result: list[types.CodeAction] = []
     if not analysis.is_checked:
         # The editor asks again when it is told of the findings.
-        return found
+        return result
     first, last = analysis.text.offset(wanted.start), analysis.text.offset(wanted.end)
     for finding in analysis.report:
         start, end = _offsets(analysis, finding)
@@ -62,7 +62,7 @@ def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.Cod
         concerned = [_diagnostic(analysis, finding)]
         if finding.fix is not None:
             edits = _edits(analysis, finding.fix.edits)
-            found.append(
+            result.append(
                 types.CodeAction(
                     _title(finding), kind=types.CodeActionKind.QuickFix, diagnostics=concerned,
                     is_preferred=finding.fix.safe, edit=types.WorkspaceEdit({uri: edits}),
@@ -71,7 +71,7 @@ def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.Cod
         ignoring = _ignoring(analysis, finding) if finding.code[4] != "0" else None
         if ignoring is not None:
             where = "in this table" if analysis.is_table else "on this line"
-            found.append(
+            result.append(
                 types.CodeAction(
                     f"Ignore {finding.code} ({finding.name}) {where}", kind=types.CodeActionKind.QuickFix,
                     diagnostics=concerned, edit=types.WorkspaceEdit({uri: [ignoring]}),
@@ -79,13 +79,13 @@ def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.Cod
             )  # fmt: skip
     safe = _edits(analysis, edits_of(analysis.report)[0])
     if safe:
-        found.append(
+        result.append(
             types.CodeAction(
                 "Mend everything that is certain", kind=types.CodeActionKind.SourceFixAll,
                 edit=types.WorkspaceEdit({uri: safe}),
             )
         )  # fmt: skip
-    return found
+    return result
 
 
 def _title(finding: Finding) -> str:
@@ -97,7 +97,7 @@ def _title(finding: Finding) -> str:
 
 
 def _edits(analysis: Analysis, edits: Iterable[Edit]) -> list[types.TextEdit]:
-    found = []
+    result = []
     data, is_table = analysis.source.data, analysis.is_table and not analysis.text.content.isascii()
     seen = characters = 0
     for edit in sorted(edits, key=lambda edit: edit.start):
@@ -106,8 +106,8 @@ def _edits(analysis: Analysis, edits: Iterable[Edit]) -> list[types.TextEdit]:
             # Mends of tables count bytes.
             characters += len(data[seen:start].decode())
             seen, start, end = start, characters, characters + len(data[start:end].decode())
-        found.append(types.TextEdit(analysis.text.range(start, end), edit.text))
-    return found
+        result.append(types.TextEdit(analysis.text.range(start, end), edit.text))
+    return result
 
 
 def _ignoring(analysis: Analysis, finding: Finding) -> types.TextEdit | None:

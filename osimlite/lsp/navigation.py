@@ -53,7 +53,7 @@ def _symbols(analysis: Analysis, item: Object) -> list[types.DocumentSymbol]:
 
 def folds(analysis: Analysis) -> list[types.FoldingRange]:
     """Elements and comments of more than one line."""
-    found, open_lines = [], []
+    result, open_lines = [], []
     for piece in markup(analysis.markup):
         line = analysis.text.position(piece.start).line
         if piece.kind == "open":
@@ -61,11 +61,11 @@ def folds(analysis: Analysis) -> list[types.FoldingRange]:
         elif piece.kind == "comment":
             last = analysis.text.position(piece.end).line
             if last > line:
-                found.append(types.FoldingRange(line, last, kind=types.FoldingRangeKind.Comment))
+                result.append(types.FoldingRange(line, last, kind=types.FoldingRangeKind.Comment))
         elif piece.kind == "close" and any(tag == piece.tag for tag, _ in open_lines):
             tag, first = open_lines.pop()
             while tag != piece.tag:
                 tag, first = open_lines.pop()
             if line > first:
-                found.append(types.FoldingRange(first, line))
-    return found
+                result.append(types.FoldingRange(first, line))
+    return result

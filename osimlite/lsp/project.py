@@ -76,13 +76,13 @@ class Project:
     def depending_on(self, analysis: Analysis) -> list[str]:
         """The URIs of other open files that are checked together with a document."""
         path = os.path.realpath(analysis.file)
-        found = []
+        result = []
         for uri, other in self.open.items():
             if other is not analysis and other.is_checked:
                 outside = other.subject.outside()
                 if outside is None or path in map(os.path.realpath, outside):
-                    found.append(uri)
-        return found
+                    result.append(uri)
+        return result
 
     def location(self, target: Target) -> types.Location | None:
         """Where something stands."""

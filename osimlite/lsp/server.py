@@ -70,8 +70,8 @@ class Server(LanguageServer):
 
     def show(self, uri: str, text: Text) -> Analysis:
         """Take a new version of a file."""
-        found = self.project.open[uri] = Analysis(text, to_fs_path(uri) or uri, recalls=True)
-        return found
+        result = self.project.open[uri] = Analysis(text, to_fs_path(uri) or uri, recalls=True)
+        return result
 
     def check(self, uri: str, pause: float = PAUSE) -> None:
         """Check a file as soon as nobody types."""
@@ -96,7 +96,7 @@ class Server(LanguageServer):
         analysis = self.project.open[uri]
         began = time.monotonic()
         try:
-            found = diagnostics(analysis)
+            result = diagnostics(analysis)
         except OsimliteError as error:
             # The settings of the project make no sense; the file itself is checked when they do.
             self.window_show_message(types.ShowMessageParams(types.MessageType.Error, str(error)))
@@ -106,7 +106,7 @@ class Server(LanguageServer):
             self.report_server_error(error, FeatureRequestError)
             return
         self._took[uri] = min(time.monotonic() - began, LONGEST_PAUSE)
-        self._publish(uri, found)
+        self._publish(uri, result)
         if analysis.is_certain:
             self.project.known[uri] = analysis
             if self.project.hold(analysis):
@@ -246,9 +246,9 @@ def _add_writing(server: Server) -> None:
 
     @server.feature(types.TEXT_DOCUMENT_CODE_ACTION, kinds)
     def acted(_: Server, params: types.CodeActionParams) -> list[types.CodeAction]:
-        found = actions(server.of(params.text_document), params.text_document.uri, params.range)
+        result = actions(server.of(params.text_document), params.text_document.uri, params.range)
         wanted = params.context.only
-        return [a for a in found if not wanted or any((a.kind or "").startswith(kind) for kind in wanted)]
+        return [a for a in result if not wanted or any((a.kind or "").startswith(kind) for kind in wanted)]
 
     @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
     def prepared(_: Server, params: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:

@@ -43,9 +43,9 @@ class Text:
         if self._is_plain or line.isascii():
             return start + min(position.character, len(line))
         units = 0
-        for place, character in enumerate(line):
+        for index, character in enumerate(line):
             if units >= position.character:
-                return start + place
+                return start + index
             units += self._width(character)
         return start + len(line)
 

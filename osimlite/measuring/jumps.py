@@ -108,8 +108,8 @@ def _narrowed(paths: Paths, suspects: Sequence[Suspect]) -> list[float]:
         moves = active & ~is_before
         low, before = np.where(moves, middle, low), np.where(moves, here, before)
         active = high - low > ASIDE
-    found: list[float] = np.where([item.excess < inf for item in suspects], 0.5 * (low + high), low).tolist()
-    return found
+    result: list[float] = np.where([item.excess < inf for item in suspects], 0.5 * (low + high), low).tolist()
+    return result
 
 
 def _beside(suspect: Suspect, value: float) -> Array:

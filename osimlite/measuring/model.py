@@ -67,7 +67,7 @@ def measured(
         starts += [begun] if begun is not None else []
         reaches += [reach_of(fibers, shortest, True, short), reach_of(fibers, longest, False, long)]
     moved = {sweep.place: sweep.moved for sweep in looked_at}
-    found = Measures(
+    result = Measures(
         {name: tuple(place for place, own in moved.items() if own[k]) for k, name in enumerate(paths.names)},
         [*wrappings(around, paths, start, looked_at)] if around is not None else [],
         [*jumps(paths, looked_at)],
@@ -76,7 +76,7 @@ def measured(
         starts,
         reaches,
     )
-    return found if still is None else together(still, found)
+    return result if still is None else together(still, result)
 
 
 def _on_surfaces(paths: Paths, start: Array, looked_at: list[Sweep]) -> Iterator[LengthOnSurface]:

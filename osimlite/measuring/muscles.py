@@ -52,8 +52,8 @@ class Fibers(NamedTuple):
         """The states in equilibrium at a length of the path (m), NaN if there is none."""
         if not self.is_elastic:
             return states
-        is_found, *found = self._asked(self.kind.equilibrium, length, states)
-        return states | dict(zip(self.kind.settled, found if is_found else repeat(nan), strict=False))
+        is_found, *result = self._asked(self.kind.equilibrium, length, states)
+        return states | dict(zip(self.kind.settled, result if is_found else repeat(nan), strict=False))
 
     def at(self, length: float, states: dict[str, float]) -> dict[str, float]:
         """What the law gives by the names of its outputs, the path at rest; tension and fiber length are normalized."""
@@ -66,11 +66,11 @@ class Fibers(NamedTuple):
         assert law is not None
         given = [states[state.name] for state in self.kind.states if state.given]
         try:
-            found: Sequence[Any] = law(length, 0.0, states.get("activation", 1.0), *given, *self.values)
+            result: Sequence[Any] = law(length, 0.0, states.get("activation", 1.0), *given, *self.values)
         except (ArithmeticError, ValueError):
             # Machine code has no number there.
             return [nan] * len(self.kind.outputs)
-        return found
+        return result
 
 
 def fibers_of(model: Model, mechanism: Mechanism, wanted: Container[str]) -> Iterator[Fibers]:

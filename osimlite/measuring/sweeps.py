@@ -95,7 +95,7 @@ def sweeps(paths: Paths, start: Array, others: Container[int] = ()) -> list[Swee
         others: places of coordinates that change the length of a path that is not among these.
     """
     are_tied, left = tied(paths, start), TIED_POSES
-    found: list[tuple[int, Array, bool]] = []
+    result: list[tuple[int, Array, bool]] = []
     for place, info in enumerate(paths.mechanism.coordinates):
         low, high = info.range
         if info.locked or info.prescribed is not None or info.yielding or not 0.0 < high - low <= WIDEST:
@@ -106,10 +106,10 @@ def sweeps(paths: Paths, start: Array, others: Container[int] = ()) -> list[Swee
         left -= is_tied * TIED_VALUES
         poses = _poses(paths, start, place, np.linspace(low, high, TIED_VALUES if is_tied else VALUES), is_tied)
         if len(poses) > 1:
-            found.append((place, poses, is_tied))
-    rows = paths.system.lengths(np.concatenate([np.empty((0, len(start))), *(poses for _, poses, _ in found)]))
+            result.append((place, poses, is_tied))
+    rows = paths.system.lengths(np.concatenate([np.empty((0, len(start))), *(poses for _, poses, _ in result)]))
     swept = []
-    for place, poses, is_tied in found:
+    for place, poses, is_tied in result:
         own, rows = np.split(rows, [len(poses)])
         swept.append(Sweep(paths, place, poses, is_tied, own))
     return [sweep for sweep in swept if sweep.place in others or sweep.moved.any()]
@@ -121,15 +121,15 @@ def _poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool)
     poses[:, place] = values
     if not is_tied:
         return poses
-    found: list[Array] = []
+    result: list[Array] = []
     above = values >= start[place]
     for away in (poses[above], poses[~above][::-1]):
         for q in away:
             try:
-                found.append(paths.mechanism.assemble(q, kept=(place,)))
+                result.append(paths.mechanism.assemble(q, kept=(place,)))
             except SimulationError:
                 break
-    return np.array(sorted(found, key=lambda q: float(q[place]))).reshape(-1, len(start))
+    return np.array(sorted(result, key=lambda q: float(q[place]))).reshape(-1, len(start))
 
 
 def tied(paths: Paths, start: Array) -> Array:
@@ -139,5 +139,5 @@ def tied(paths: Paths, start: Array) -> Array:
         return np.zeros(len(start), dtype=bool)
     state = kinematics(paths.mechanism, start, np.zeros(len(start)), bodies=paths.mechanism.constrained)
     rows, _ = stacked([item.velocity_equations(state) for item in constraints])
-    found: Array = np.abs(rows).max(axis=0) > 0.0
-    return found
+    result: Array = np.abs(rows).max(axis=0) > 0.0
+    return result

@@ -71,7 +71,7 @@ def _candidates(name: str, folders: Sequence[Path]) -> Iterator[Path]:
     yield from (folder / name for folder in folders if _is_file(folder / name))
     if not Path(name).is_absolute():
         parts = Path(name.replace("\\", "/")).parts
-        yield from (found for folder in folders for found in _descend(folder, parts))
+        yield from (result for folder in folders for result in _descend(folder, parts))
 
 
 def _is_file(path: Path) -> bool:

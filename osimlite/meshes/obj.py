@@ -68,10 +68,10 @@ def _parsed(content: bytes, name: str) -> tuple[Polygons, Array | None, Indices]
         raise OsimliteError("it is not an OBJ file with faces; save it again", file=name)
     if max(corners) >= len(points):
         raise OsimliteError("a face names a point that is not there; save it again", file=name)
-    found = np.array(points)
-    if not np.isfinite(found).all():
+    result = np.array(points)
+    if not np.isfinite(result).all():
         raise OsimliteError("a point is not three finite numbers; save it again", file=name)
-    polygons = Polygons(found, np.array(corners, dtype=np.int64), np.array(ends, dtype=np.int64))
+    polygons = Polygons(result, np.array(corners, dtype=np.int64), np.array(ends, dtype=np.int64))
     if len(chosen) < len(corners) or max(chosen) >= len(normals):
         return polygons, None, polygons.corners
     return polygons, _vectors(normals), np.array(chosen, dtype=np.int64)
@@ -93,7 +93,7 @@ def _place(word: str, count: int) -> int:
 def _vectors(rows: list[list[str]]) -> Array | None:
     """Rows of three finite numbers as an array; None if they are not."""
     try:
-        found = np.array(rows, dtype=np.float64)
+        result = np.array(rows, dtype=np.float64)
     except ValueError:
         return None
-    return found if found.shape == (len(rows), 3) and np.isfinite(found).all() else None
+    return result if result.shape == (len(rows), 3) and np.isfinite(result).all() else None

@@ -95,7 +95,7 @@ def strip_triangles(strip: Indices) -> Indices:
 
 def _halves(points: Array, quads: Indices) -> Indices:
     """Two triangles for each of k quadrilaterals (2 k, 3): cut where both halves turn the same way."""
-    a, b, c, d = (points[quads[:, place]] for place in range(4))
+    a, b, c, d = (points[quads[:, index]] for index in range(4))
     agreement = np.einsum("ij,ij->i", np.cross(b - a, c - a), np.cross(c - a, d - a))
     cut = np.where((agreement < 0.0)[:, None], (1, 2, 3, 1, 3, 0), (0, 1, 2, 0, 2, 3))
     return np.take_along_axis(quads, cut, axis=1).reshape(-1, 3)

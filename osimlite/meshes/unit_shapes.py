@@ -103,11 +103,11 @@ def normals_of(surface: Surface) -> Array:
     """Outward unit vectors at the points (n, 3): those that come with the surface, else the mean of the triangles'."""
     if surface.normals is not None:
         return surface.normals
-    a, b, c = (surface.points[surface.triangles[:, place]] for place in range(3))
+    a, b, c = (surface.points[surface.triangles[:, index]] for index in range(3))
     areas = np.cross(b - a, c - a)
     total = np.zeros_like(surface.points)
-    for place in range(3):
-        np.add.at(total, surface.triangles[:, place], areas)
+    for index in range(3):
+        np.add.at(total, surface.triangles[:, index], areas)
     lengths = np.linalg.norm(total, axis=1, keepdims=True)
     result: Array = total / np.where(lengths > 0.0, lengths, 1.0)
     return result

@@ -126,8 +126,8 @@ class _File:
         ends = np.concatenate(sizes).cumsum()
         if not len(ends):
             raise _Unreadable("it has no polygons")
-        found = Polygons(np.concatenate(points), np.concatenate(corners), ends)
-        return found, np.concatenate(normals) if all_normals else None
+        result = Polygons(np.concatenate(points), np.concatenate(corners), ends)
+        return result, np.concatenate(normals) if all_normals else None
 
     def _polygons(self, piece: etree._Element, count: int) -> Iterator[tuple[Indices, Indices]]:
         """Corners, one after the other, and numbers of corners: of polygons, then of the triangles of every strip."""

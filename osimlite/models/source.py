@@ -76,10 +76,10 @@ def _function(source: str) -> Callable[..., Any]:
         known = did_you_mean(source, BUILT_IN) or f"; the built-in models are {listed(BUILT_IN)}"
         raise OsimliteError(f"'{source}' is no built-in model, Python file, module:function or data file{known}")
     if name:
-        found = getattr(module, name, None)
-        if not callable(found):
+        result = getattr(module, name, None)
+        if not callable(result):
             raise OsimliteError(f"'{place}' has no function '{name}'{did_you_mean(name, _functions(module))}")
-        return found
+        return result
     return _only_function(module, place)
 
 

@@ -42,21 +42,21 @@ def coordinate_drivers(robot: Robot) -> dict[int, Driver]:
     A coupler of several coordinates is not followed, and couplers in a circle leave the first coordinate free.
     """
     infos, values = robot.mechanism.coordinates, robot.mechanism.values({})
-    found = {place: Driver(None, f.Constant(float(values[place]))) for place, info in enumerate(infos) if info.locked}
+    result = {place: Driver(None, f.Constant(float(values[place]))) for place, info in enumerate(infos) if info.locked}
     steps = {item.dependent: item for item in couplers(robot) if len(item.independent) == 1}
 
     def drive(place: int, above: frozenset[int]) -> Driver:
-        if place in found:
-            return found[place]
+        if place in result:
+            return result[place]
         step = steps.get(place)
         if step is None or step.independent[0] in above | {place}:
             return Driver(place, f.IDENTITY)
         return _after(step.function, drive(step.independent[0], above | {place}))
 
     for place in steps:
-        if place not in found and (driver := drive(place, frozenset())).coordinate != place:
-            found[place] = driver
-    return found
+        if place not in result and (driver := drive(place, frozenset())).coordinate != place:
+            result[place] = driver
+    return result
 
 
 def joint_driver(joint: RobotJoint, drivers: dict[int, Driver]) -> Driver | None:

@@ -36,8 +36,8 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
 
     def origin(place: int) -> tuple[int, Line]:
         """The coordinate farthest up that has a leader, and the line from it to this one."""
-        found = place, Line(1.0, 0.0)
-        line, seen = found[1], {place}
+        results = place, Line(1.0, 0.0)
+        line, seen = results[1], {place}
         while place in follows:
             place, step = follows[place]
             if place in seen:
@@ -46,8 +46,8 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
             seen.add(place)
             line = line.after(step)
             if place in leads:
-                found = place, line
-        return found
+                results = place, line
+        return results
 
     result: dict[str, Mimic] = {}
     for joint in robot.moving:
@@ -64,9 +64,9 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
 
 def leaders(robot: Robot) -> dict[int, tuple[RobotJoint, Line]]:
     """For coordinates the joint that others follow: the one that is the coordinate, else one that is a line of it."""
-    found: dict[int, tuple[RobotJoint, Line]] = {}
+    result: dict[int, tuple[RobotJoint, Line]] = {}
     for joint in robot.moving:
         line = as_line(joint.function)
         if len(joint.coordinates) == 1 and line is not None and line.slope:
-            found.setdefault(joint.coordinates[0], (joint, line))
-    return found | {place: (joint, Line(1.0, 0.0)) for place, joint in robot.joint_of.items()}
+            result.setdefault(joint.coordinates[0], (joint, line))
+    return result | {place: (joint, Line(1.0, 0.0)) for place, joint in robot.joint_of.items()}

@@ -51,11 +51,11 @@ def xml_name(name: str) -> str:
 
 def distinct(names: Sequence[str], spell: Callable[[str], str]) -> list[str]:
     """The names as they are spelt, no two alike; one that keeps its spelling comes before those that turn into it."""
-    found, taken = [*names], set[str]()
+    result, taken = [*names], set[str]()
     for place in sorted(range(len(names)), key=lambda place: spell(names[place]) != names[place]):
-        found[place] = unused(spell(names[place]), taken)
-        taken.add(found[place])
-    return found
+        result[place] = unused(spell(names[place]), taken)
+        taken.add(result[place])
+    return result
 
 
 def joint_names(mechanism: Mechanism) -> list[str]:

@@ -30,7 +30,7 @@ def collect_collisions(
         fidelity: is told what a collision shape does not say, and which surfaces have none.
         mesh_files: finds mesh files, and takes them up.
     """
-    tree, found = model.tree(), dict[str, list[Visual]]()
+    tree, result = model.tree(), dict[str, list[Visual]]()
     for geometry in tree.components:
         if not isinstance(geometry, ContactGeometry):
             continue
@@ -51,8 +51,8 @@ def collect_collisions(
         body, placed = mechanism.frames[frame]
         owner = "/ground" if body < 0 else mechanism.bodies[body].path
         origin = placed @ offset(geometry.location, geometry.orientation) @ own
-        found.setdefault(owner, []).append(Visual(shape, origin, source=path))
-    return found
+        result.setdefault(owner, []).append(Visual(shape, origin, source=path))
+    return result
 
 
 def _shape(

@@ -71,12 +71,12 @@ class Group:
 
     def worst(self) -> list[tuple[str, Error]]:
         """The largest error of each quantity and unit, whatever it is about."""
-        found: dict[tuple[str, str], Error] = {}
+        result: dict[tuple[str, str], Error] = {}
         for record in self.records:
             for what, error in record.errors.items():
                 name = what.partition(" about ")[0]
-                found[name, error.unit] = max(error, found.get((name, error.unit), error))
-        return [(name, error) for (name, _), error in found.items()]
+                result[name, error.unit] = max(error, result.get((name, error.unit), error))
+        return [(name, error) for (name, _), error in result.items()]
 
 
 @dataclass
@@ -125,10 +125,10 @@ class Fidelity:
 
     def groups(self) -> list[Group]:
         """The records, those of one kind that say the same together, in the order of the first of each."""
-        found: dict[tuple[str, str, str], list[Record]] = {}
+        result: dict[tuple[str, str, str], list[Record]] = {}
         for record in self.records:
-            found.setdefault((record.kind, record.cannot_say, record.done), []).append(record)
-        return [Group(*key, tuple(records)) for key, records in found.items()]
+            result.setdefault((record.kind, record.cannot_say, record.done), []).append(record)
+        return [Group(*key, tuple(records)) for key, records in result.items()]
 
     def counts(self) -> tuple[int, int, int]:
         """How many components are in the target as they are, in another way, and not at all."""

@@ -76,7 +76,7 @@ def _coordinates(robot: Robot) -> list[dict[str, Any]]:
 
 def _joints(robot: Robot) -> list[dict[str, Any]]:
     following, coordinates = mimics(robot), robot.mechanism.coordinates
-    found: list[dict[str, Any]] = []
+    result: list[dict[str, Any]] = []
     for joint in robot.moving:
         said: dict[str, Any] = {
             "name": joint.name,
@@ -89,8 +89,8 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
             said["identity"] = True
         if (mimic := following.get(joint.name)) is not None:
             said |= {"mimics": mimic.leader, "multiplier": mimic.line.slope, "offset": mimic.line.start}
-        found.append(said)
-    return found
+        result.append(said)
+    return result
 
 
 def _couplers(robot: Robot) -> list[dict[str, Any]]:

@@ -29,7 +29,7 @@ def strength(
     """
     tree = model.tree()
     places = {info.path: place for place, info in enumerate(robot.mechanism.coordinates)}
-    found: dict[int, list[tuple[str, float]]] = {}
+    result: dict[int, list[tuple[str, float]]] = {}
     for actuator in tree.components:
         if not isinstance(actuator, CoordinateActuator) or not actuator.coordinate or not actuator.appliesForce:
             continue
@@ -40,9 +40,9 @@ def strength(
         greatest = max(abs(actuator.min_control), abs(actuator.max_control))
         force = abs(actuator.optimal_force) * greatest if actuator.optimal_force else 0.0
         if place is not None:
-            found.setdefault(place, []).append((tree.path_of(actuator) or "", force))
+            result.setdefault(place, []).append((tree.path_of(actuator) or "", force))
     limits: dict[str, float] = {}
-    for place, actuators in found.items():
+    for place, actuators in result.items():
         total = sum(force for _, force in actuators)
         joint = robot.joint_of.get(place)
         if joint is None or not math.isfinite(total):

@@ -83,10 +83,10 @@ class _Survey:
         self._links()
         self._joints()
         for index, info in enumerate(self.robot.mechanism.coordinates):
-            found = self.tree.by_path.get(info.path)
+            result = self.tree.by_path.get(info.path)
             # Those of a joint that OpenSim adds under a loose body stand in no file.
-            if isinstance(found, Coordinate):
-                self._coordinate(index, found, info.path)
+            if isinstance(result, Coordinate):
+                self._coordinate(index, result, info.path)
         for link in self.robot.links:
             for kind, shapes in (("visual", link.visuals), ("collision", link.collisions)):
                 for shape in shapes:

@@ -107,8 +107,8 @@ def _encoded(frames: list[Any], fps: int, image: Any) -> bytes:
     some = frames[:: max(1, len(frames) // 6)]
     width, height = frames[0].size
     sheet = image.new("RGB", (width * len(some), height))
-    for place, frame in enumerate(some):
-        sheet.paste(frame, (place * width, 0))
+    for index, frame in enumerate(some):
+        sheet.paste(frame, (index * width, 0))
     palette = sheet.quantize(128, dither=image.Dither.NONE)
     first, *others = (frame.quantize(palette=palette, dither=image.Dither.NONE) for frame in frames)
     out = io.BytesIO()

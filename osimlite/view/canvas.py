@@ -76,8 +76,8 @@ class Canvas:
         colors = np.zeros_like(fields[:, 0, :, 0])
         for row, column in np.ndindex(fine, fine):
             colors += fields[:, row, :, column]
-        found: NDArray[np.uint8] = np.rint(255.0 / fine**2 * colors).clip(0.0, 255.0).astype(np.uint8)
-        return found
+        result: NDArray[np.uint8] = np.rint(255.0 / fine**2 * colors).clip(0.0, 255.0).astype(np.uint8)
+        return result
 
     def _spans(self, places: Array) -> Iterator[_Spans]:
         """The pixels whose centres triangles cover, in portions: row by row, from edge to edge."""
@@ -141,8 +141,8 @@ class _Spans(NamedTuple):
         """What has these values (t, 3, ...) at the corners, at pixels."""
         own = corners[self.triangles]
         first, change = (np.einsum("sc,sc...->s...", part, own) for part in (self.weights, self.changes))
-        found: Array = first[which] + change[which] * steps
-        return found
+        result: Array = first[which] + change[which] * steps
+        return result
 
 
 def _middle(numbers: Indices) -> Array:
@@ -160,13 +160,13 @@ def _counted(starts: Indices, counts: Indices) -> tuple[Indices, Indices]:
 
 def _weights(corners: Array, x: Array, y: Array) -> tuple[Array, Array]:
     """The weights (k, 3) of the corners (k, 3, 2) of triangles at points in them, and their derivatives along x."""
-    (ax, ay), (bx, by), (cx, cy) = (corners[:, place].T for place in range(3))
+    (ax, ay), (bx, by), (cx, cy) = (corners[:, index].T for index in range(3))
     with np.errstate(all="ignore"):
         size = 1.0 / ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
         first = ((bx - x) * (cy - y) - (by - y) * (cx - x)) * size
         second = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) * size
-        found = np.stack((first, second, 1.0 - first - second), axis=1)
+        result = np.stack((first, second, 1.0 - first - second), axis=1)
         change = np.stack(((by - cy) * size, (cy - ay) * size, (ay - by) * size), axis=1)
     # A triangle seen from its edge covers pixels without a middle.
-    clear = np.isfinite(found).all(axis=1, keepdims=True) & np.isfinite(change).all(axis=1, keepdims=True)
-    return np.where(clear, found, 1.0 / 3.0), np.where(clear, change, 0.0)
+    clear = np.isfinite(result).all(axis=1, keepdims=True) & np.isfinite(change).all(axis=1, keepdims=True)
+    return np.where(clear, result, 1.0 / 3.0), np.where(clear, change, 0.0)

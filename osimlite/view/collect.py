@@ -236,10 +236,10 @@ class _Collector:
             raise UnsupportedError(f"is a {type(path).__name__}, which runs nowhere: osimlite does not draw it")
         of = (self.tree.path_of(owner) if owner is not None else None) or name
         visible = path.appearance.visible and getattr(owner, "appliesForce", True)
-        found: list[Component | None] = []
+        result: list[Component | None] = []
         if isinstance(path, GeometryPath):
-            found = [self.tree.target(wrap, "wrap_object", wrap.wrap_object) for wrap in path.path_wrap_set.objects]
-        wraps = tuple(self.tree.path_of(surface) or "" for surface in found if surface is not None)
+            result = [self.tree.target(wrap, "wrap_object", wrap.wrap_object) for wrap in path.path_wrap_set.objects]
+        wraps = tuple(self.tree.path_of(surface) or "" for surface in result if surface is not None)
         belly, tendon = _fibers(owner) if isinstance(owner, Muscle) else (0.0, 0.0)
         self.lines.append(Line(of, "paths", course, path.appearance.color, 0.0035, visible, wraps, belly, tendon))
 
@@ -257,9 +257,9 @@ class _Collector:
             case HuntCrossleyForce() | contact_forces.ElasticFoundationForce():
                 spec = field_specs(type(force).ContactParameters)["geometry"]
                 for parameters in force.contact_parameters.objects:
-                    for place, word in enumerate(parameters.geometry):
-                        found = self.tree.resolve(Use(parameters, force, spec, word, place)).target
-                        self._push(force.name, path, found, None)
+                    for index, word in enumerate(parameters.geometry):
+                        result = self.tree.resolve(Use(parameters, force, spec, word, index)).target
+                        self._push(force.name, path, result, None)
             case contact_forces.SmoothSphereHalfSpaceForce():
                 sphere = self.tree.target(force, "socket_sphere", force.socket_sphere)
                 self._push(force.name, path, sphere, "Sphere")
@@ -319,12 +319,12 @@ class _Collector:
 
     def _mesh(self, name: str) -> Surface:
         """The mesh in a file; the same for the same file."""
-        found = self.folders.find(name)
-        if found is None:
+        result = self.folders.find(name)
+        if result is None:
             raise ModelError(f"the mesh file {name} is in none of the folders searched; name its folder {NAMED_SO}")
-        if found not in self.meshes:
-            self.meshes[found] = read_surface(found)
-        return self.meshes[found]
+        if result not in self.meshes:
+            self.meshes[result] = read_surface(result)
+        return self.meshes[result]
 
     def _place(self, owner: Component, socket: str) -> tuple[int, Array]:
         value = getattr(owner, socket)
@@ -334,8 +334,8 @@ class _Collector:
         return self.mechanism.placement(self.tree.path_of(frame) or "")
 
     def _coordinate(self, owner: Component, socket: str) -> int:
-        found = self.tree.target(owner, socket, getattr(owner, socket))
-        return self.mechanism.coordinate_index(self.tree.path_of(found) or "")
+        result = self.tree.target(owner, socket, getattr(owner, socket))
+        return self.mechanism.coordinate_index(self.tree.path_of(result) or "")
 
     def _with_half_spaces(self, scene: Scene) -> Scene:
         """The same scene with its half spaces made as wide as the model asks for."""

@@ -87,11 +87,11 @@ def _segments(
 
     Of a path that has fewer corners at a moment the last pieces have no length.
     """
-    for place, line in enumerate(scene.lines):
+    for index, line in enumerate(scene.lines):
         if line.visible and line.layer in scene.shown:
-            corners = [pose.lines[place] for pose in poses]
+            corners = [pose.lines[index] for pose in poses]
             most = max(map(len, corners))
-            full = [found[np.minimum(np.arange(most), len(found) - 1)] for found in corners if len(found)]
+            full = [result[np.minimum(np.arange(most), len(result) - 1)] for result in corners if len(result)]
             if len(full) == len(poses):
                 for k in range(most - 1):
                     yield line.path, line.color, line.radius, np.array(full)[:, k : k + 2]
@@ -116,17 +116,17 @@ def _along(ends: Array, radius: float) -> _Track:
 
 def _turning(axis: Array, cosine: float) -> Array:
     """The quaternion x y z w that turns one unit vector into another, from their cross product and cosine."""
-    found = np.array((*axis, 1.0 + cosine))
-    size = float(np.linalg.norm(found))
-    return found / size if size > 1e-9 else np.array((1.0, 0.0, 0.0, 0.0))
+    result = np.array((*axis, 1.0 + cosine))
+    size = float(np.linalg.norm(result))
+    return result / size if size > 1e-9 else np.array((1.0, 0.0, 0.0, 0.0))
 
 
 def _continuous(quaternions: Array) -> Array:
     """The same turns, each with the sign that is nearer to the one before: players go the straight way between them."""
     turned = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
     signs = np.where(np.cumsum(np.concatenate(((False,), turned))) % 2 == 1, -1.0, 1.0)
-    found: Array = quaternions * signs[:, None]
-    return found
+    result: Array = quaternions * signs[:, None]
+    return result
 
 
 class _Writer:

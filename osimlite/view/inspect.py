@@ -50,7 +50,7 @@ def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[s
             "kind": kind,
             "parent": -1 if above is None else places.get(id(above), -1),
             "values": [text if len(text) <= LONGEST else text[:LONGEST] + " …" for _, text, _ in rows],
-            "given": [place for place, (_, _, given) in enumerate(rows) if given],
+            "given": [index for index, (_, _, given) in enumerate(rows) if given],
         }
         if tags.setdefault(kind, names) != names:
             node["tags"] = names
@@ -106,12 +106,12 @@ def finding_rows(findings: Sequence[Finding]) -> list[dict[str, Any]]:
 def pins(model: Model, scene: Scene, findings: Sequence[Finding]) -> list[dict[str, Any]]:
     """Where in space findings are pinned: for every component that is anywhere, its codes and the worst severity."""
     tree, mechanism = model.tree(), scene.mechanism
-    found: dict[str, list[Finding]] = {}
+    results: dict[str, list[Finding]] = {}
     for item in findings:
         if item.component in tree.by_path and item.severity.rank < 2:
-            found.setdefault(item.component, []).append(item)
+            results.setdefault(item.component, []).append(item)
     result = []
-    for path, items in found.items():
+    for path, items in results.items():
         place = _place(tree, mechanism, scene, tree.by_path[path])
         if place is not None:
             worst = min(items, key=lambda item: item.severity.rank)

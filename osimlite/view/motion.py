@@ -55,14 +55,14 @@ class ContactForce(NamedTuple):
 
 def contact_forces(motion: Motion) -> list[ContactForce]:
     """The force vectors among the columns of `motion.forces`, in their order."""
-    found = []
+    result = []
     for label in motion.forces:
         if label.endswith(".force.X"):
             place = label.removesuffix(".force.X")
             element, _, frame = place.partition(".")
             torques = _columns(motion, f"{place}.torque") if f"{place}.torque.X" in motion.forces else None
-            found.append(ContactForce(element, frame, _columns(motion, f"{place}.force"), torques))
-    return found
+            result.append(ContactForce(element, frame, _columns(motion, f"{place}.force"), torques))
+    return result
 
 
 def _columns(motion: Motion, label: str) -> Array:
@@ -76,8 +76,8 @@ def activity(scene: Scene, motion: Motion) -> dict[str, Array]:
     """
     known = {}
     for label, column in motion.auxiliary.items():
-        if found := re.fullmatch(r"(?:.*/)?(.+)[./]activation", label):
-            known[found[1]] = np.clip(np.nan_to_num(np.asarray(column, dtype=float)), 0.0, 1.0)
+        if result := re.fullmatch(r"(?:.*/)?(.+)[./]activation", label):
+            known[result[1]] = np.clip(np.nan_to_num(np.asarray(column, dtype=float)), 0.0, 1.0)
     paths = [line.path for line in scene.lines if line.layer == "paths"]
     return {path: known[name] for path in paths if (name := path.rpartition("/")[2]) in known}
 
@@ -91,10 +91,10 @@ def moving(poses: Sequence[Bodies]) -> Array:
     """Which bodies (b + 1,) change place from pose to pose; all but ground if none does."""
     rotations, origins = np.array([p.rotations for p in poses]), np.array([p.origins for p in poses])
     change = np.ptp(rotations, axis=0).max(axis=(1, 2)) + np.ptp(origins, axis=0).max(axis=1)
-    found: Array = change > 1e-9
-    if not found.any():
-        found[:-1] = True
-    return found
+    result: Array = change > 1e-9
+    if not result.any():
+        result[:-1] = True
+    return result
 
 
 def at_times(motion: Motion, columns: Array, times: Array) -> Array:

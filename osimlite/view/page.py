@@ -150,8 +150,8 @@ def _drawn(scene: Scene) -> dict[str, Any]:
     return {
         "surfaces": [_surface(surface) for surface in scene.surfaces],
         "items": [
-            {**vars(item), "matrix": _rows(item.matrix), "scenery": place in scene.large}
-            for place, item in enumerate(scene.items)
+            {**vars(item), "matrix": _rows(item.matrix), "scenery": index in scene.large}
+            for index, item in enumerate(scene.items)
         ],
         "lines": [
             {
@@ -180,7 +180,7 @@ def _surface(surface: Surface) -> dict[str, str]:
 
 def _bodies(mechanism: Mechanism) -> list[dict[str, Any]]:
     """Every body: who carries it, and the fixed transforms and motions on the way to it."""
-    found = []
+    result = []
     for body in mechanism.bodies:
         chain: list[Any] = []
         for part in body.mobilizer.elementary():
@@ -197,24 +197,24 @@ def _bodies(mechanism: Mechanism) -> list[dict[str, Any]]:
             elif not np.array_equal(part.matrix, np.eye(4)):
                 chain.append(_rows(part.matrix))
         center = body.mass_properties.center.tolist()
-        found.append({"path": body.path, "name": body.name, "parent": body.parent, "center": center, "chain": chain})
-    return found
+        result.append({"path": body.path, "name": body.name, "parent": body.parent, "center": center, "chain": chain})
+    return result
 
 
 def _coordinates(
     mechanism: Mechanism, dependent: set[int], q: Array, recorded: Mapping[str, Any] | None
 ) -> list[dict[str, Any]]:
     rows = []
-    for place, info in enumerate(mechanism.coordinates):
+    for index, info in enumerate(mechanism.coordinates):
         low, high = info.range
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             low, high = -10.0, 10.0
-        ends = [float(q[place])] if recorded is None else recorded["ends"][place]
+        ends = [float(q[index])] if recorded is None else recorded["ends"][index]
         still = (
             "locked"
             if info.locked
             else "follows other coordinates by a coupler"
-            if place in dependent
+            if index in dependent
             else "prescribed over time"
             if info.prescribed is not None
             else ""

@@ -244,7 +244,7 @@ class _Heap:
         elif opacity > 0.0:
             # Of what shines through, the far side is not drawn, unless that is all there is of a sheet.
             if len(corners) > 2:
-                (ax, ay), (bx, by), (cx, cy) = (corners[:, place, :2].T for place in range(3))
+                (ax, ay), (bx, by), (cx, cy) = (corners[:, index, :2].T for index in range(3))
                 seen = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0.0
                 corners, colors = corners[seen], colors[seen]
             self._glassy.append((corners, colors, np.full(len(corners), opacity)))

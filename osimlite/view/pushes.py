@@ -40,8 +40,8 @@ class Push:
         if self.torques is None or square == 0.0:
             return near
         on_line: Array = bodies.origins[self.on.body] + np.cross(force, self.torques[number]) / square
-        found: Array = on_line + force * (float(force @ (near - on_line)) / square)
-        return found
+        result: Array = on_line + force * (float(force @ (near - on_line)) / square)
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,14 +57,14 @@ class Pushes:
         Surfaces of one element on one body share a record, and are shown once.
         """
         forces = {(force.element, force.frame): force for force in contact_forces(motion)}
-        found: dict[tuple[str, str], Push] = {}
+        result: dict[tuple[str, str], Push] = {}
         for pushed in scene.pushed:
             key = next((key for key in ((pushed.element, label) for label in pushed.labels) if key in forces), None)
-            if key is not None and key not in found:
+            if key is not None and key not in result:
                 force = forces[key]
                 torques = None if force.torques is None else at_times(motion, force.torques, times)
-                found[key] = Push(pushed, at_times(motion, force.vectors, times), torques)
-        return cls(list(found.values()))
+                result[key] = Push(pushed, at_times(motion, force.vectors, times), torques)
+        return cls(list(result.values()))
 
     @property
     def largest(self) -> float:

@@ -122,17 +122,17 @@ def computed_forces(
         system.force_records(t, system.state.pack(q, u)) for t, q, u in zip(times.tolist(), values, speeds, strict=True)
     ]
     table = np.array(rows, dtype=float).reshape(len(times), len(system.columns))
-    return {label: table[:, place] for place, label in enumerate(system.columns)}
+    return {label: table[:, index] for index, label in enumerate(system.columns)}
 
 
 def _speeds(mechanism: Mechanism, table: StoTable) -> Array | None:
     """Generalized speeds (n, k) on record; None if those of a coordinate that is not locked are not."""
     speeds = np.zeros((len(table.times), len(mechanism.coordinates)))
-    for place, info in enumerate(mechanism.coordinates):
+    for index, info in enumerate(mechanism.coordinates):
         label = f"{info.path}/speed"
         if label in table.columns:
             turned = table.in_degrees and info.motion_type == "rotational"
-            speeds[:, place] = np.radians(table[label]) if turned else table[label]
+            speeds[:, index] = np.radians(table[label]) if turned else table[label]
         elif not info.locked:
             return None
     return speeds
@@ -142,4 +142,4 @@ def _columns(table: StoTable, times: Array) -> dict[str, Array]:
     if not len(table.times):
         return {}
     rows = at_times(Recording(table.times, (), table.rows, table.rows), table.rows, times)
-    return {label: rows[:, place] for place, label in enumerate(table.columns)}
+    return {label: rows[:, index] for index, label in enumerate(table.columns)}

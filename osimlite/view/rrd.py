@@ -70,9 +70,9 @@ def write_rrd(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
         still(bodies[item.body] + entity(item.path), placed, shape)
 
     levels = {} if motion is None else activity(scene, motion)
-    for place, line in enumerate(scene.lines):
+    for index, line in enumerate(scene.lines):
         if line.visible and line.layer in scene.shown:
-            name, strips = entity("model", line.layer, line.path), [pose.lines[place] for pose in poses]
+            name, strips = entity("model", line.layer, line.path), [pose.lines[index] for pose in poses]
             still(name, rr.LineStrips3D.from_fields(radii=line.radius))
             level = levels.get(line.path)
             colors = [line.color] * len(poses) if level is None else map(activity_color, level)

@@ -233,8 +233,8 @@ class Scene:
 
     def extent(self, bodies: Bodies) -> Iterator[tuple[int, Array]]:
         """Body and points (k, 3) in ground of everything that is drawn and no scenery; lines belong to body -2."""
-        for place, item in enumerate(self.items):
-            if item.visible and item.layer in self.shown and place not in self.large:
+        for index, item in enumerate(self.items):
+            if item.visible and item.layer in self.shown and index not in self.large:
                 yield item.body, bodies.points(item.body, self.corners(item))
         for line, corners in zip(self.lines, bodies.lines, strict=True):
             if line.visible and line.layer in self.shown:
@@ -243,8 +243,8 @@ class Scene:
     def box(self, q: Array) -> tuple[Array, Array]:
         """The least and greatest coordinates (3,), (3,) in ground of what is drawn and no scenery."""
         bodies = self.at(q)
-        found: list[Array] = [points for _, points in self.extent(bodies) if len(points)]
-        points = np.concatenate(found or [bodies.origins])
+        result: list[Array] = [points for _, points in self.extent(bodies) if len(points)]
+        points = np.concatenate(result or [bodies.origins])
         low, high = points.min(axis=0), points.max(axis=0)
         little = 0.05 * max(1.0, float(np.abs(points).max())) if float((high - low).max()) < 1e-6 else 0.0
         return low - little, high + little

@@ -102,12 +102,12 @@ def _handler(page: bytes, mechanism: Mechanism, patience: float) -> type[BaseHTT
 
         def do_POST(self) -> None:
             try:
-                status, found = HTTPStatus.OK, assembled(mechanism, self._question())
+                status, result = HTTPStatus.OK, assembled(mechanism, self._question())
             except _BadQuestion as problem:
-                status, found = problem.status, {"error": str(problem)}
+                status, result = problem.status, {"error": str(problem)}
                 # What is left of such a question is not the next one.
                 self.close_connection = True
-            self._answer(status, json.dumps(found).encode(), "application/json")
+            self._answer(status, json.dumps(result).encode(), "application/json")
 
         def _question(self) -> bytes:
             if not self._is_for_us() or self.path != "/assemble":
@@ -157,7 +157,7 @@ def assembled(mechanism: Mechanism, question: bytes) -> dict[str, Any]:
         return {"error": "a coordinate value is no number"}
     try:
         with np.errstate(all="ignore"):
-            found = mechanism.assemble(q)
+            result = mechanism.assemble(q)
     except (OsimliteError, ArithmeticError, np.linalg.LinAlgError) as error:
         return {"error": error.message if isinstance(error, OsimliteError) else "no pose was found"}
-    return {"values": found.tolist()} if np.isfinite(found).all() else {"error": "no pose was found"}
+    return {"values": result.tolist()} if np.isfinite(result).all() else {"error": "no pose was found"}

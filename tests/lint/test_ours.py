@@ -110,10 +110,10 @@ def test_a_folder_that_is_not_there_is_called_one(tmp_path, monkeypatch, capsys,
     assert capsys.readouterr().err == f"osimlite: {path}: there is no such folder (see docs/errors.md#folders)\n"
 
 
-def test_folders_to_write_to_lead_to_the_page_about_folders(tmp_path, fixtures, monkeypatch, capsys):
+def test_only_folders_that_are_named_lead_to_the_page_about_folders(tmp_path, fixtures, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     model = str(fixtures / "lint" / "leg.osim")
     assert main_code("upgrade", model, "-o", "no/such.osim") == 2
-    assert "the folder does not exist (see docs/errors.md#folders)" in capsys.readouterr().err
+    assert "the folder does not exist (see docs/errors.md#files)" in capsys.readouterr().err
     assert main_code("validate", model, "--geometry", "nowhere") == 2
     assert capsys.readouterr().err.endswith("(see docs/errors.md#folders)\n")

@@ -61,13 +61,13 @@ class Upgraded:
     @property
     def moved(self) -> dict[tuple[int, str], int]:
         """The element of the old document for a property, by the number of its owner and its present tag."""
-        found: dict[tuple[int, str], int] = {}
+        result: dict[tuple[int, str], int] = {}
         for element in self._draft.touched:
             parent = element.getparent()
             if parent is not None:
                 place = (self._draft.numbers[parent], as_written(element.tag))
-                found.setdefault(place, self._draft.numbers[element])
-        return found
+                result.setdefault(place, self._draft.numbers[element])
+        return result
 
 
 def upgrade(root: Element, version: int) -> Upgraded:

@@ -141,11 +141,11 @@ class Draft:
     @cached_property
     def _tags(self) -> dict[str, set[str]]:
         """Every tag that there is or was, by the families of its class."""
-        found: dict[str, set[str]] = {}
+        result: dict[str, set[str]] = {}
         for tag in {element.tag for element in self.numbers}:
             for family in families(tag):
-                found.setdefault(family, set()).add(tag)
-        return found
+                result.setdefault(family, set()).add(tag)
+        return result
 
     def _know(self, tag: str) -> None:
         for family in families(tag):
@@ -154,11 +154,11 @@ class Draft:
     @property
     def changes(self) -> list[Change]:
         """What the steps have done, in the order of the document."""
-        found = [
+        result = [
             Change(step.name, step.below, step.what, describe(owner), self.numbers[place], lost)
             for step, owner, place, lost in self._changes
         ]
-        return sorted(found, key=lambda change: change.number)
+        return sorted(result, key=lambda change: change.number)
 
     def wrap(self, tag: str) -> None:
         """Put a new root around the tree."""
@@ -179,14 +179,14 @@ class Draft:
         """
         tags = {tag for kind in kinds for tag in self._tags.get(kind, ())}
         sets = [owner for owner, kind in _FAMILY_OF_MEMBERS.items() if kind in kinds and owner in self._tags]
-        found = list(self.root.iter(*tags)) if tags else []
+        result = list(self.root.iter(*tags)) if tags else []
         if sets:
             strange = [
                 member for owner in self.root.iter(*sets) for member in members(owner) if not families(member.tag)
             ]
             if strange:
-                found = sorted(dict.fromkeys([*found, *strange]), key=lambda element: self.numbers[element])
-        return found
+                result = sorted(dict.fromkeys([*result, *strange]), key=lambda element: self.numbers[element])
+        return result
 
     def tagged(self, *tags: str) -> list[Element]:
         """Every element with one of these tags, in document order."""
@@ -233,8 +233,8 @@ class Draft:
 
     def list_in(self, parent: Element, tag: str, *, source: Element) -> Element:
         """The child that lists objects, made if it is not there."""
-        found = parent.find(tag)
-        return self.add(parent, tag, source=source) if found is None else found
+        result = parent.find(tag)
+        return self.add(parent, tag, source=source) if result is None else result
 
     def is_a(self, element: Element, family: str) -> bool:
         """Whether an element is of a class or one derived from it; of an unknown class, by the set it stands in."""

@@ -104,8 +104,8 @@ def _joint(draft: Draft, joint: Element) -> None:
 def _at(owner: Element, path: str) -> Iterator[Element]:
     """The first element of each step of a path, as OpenSim takes it; every <DisplayGeometry> there is."""
     first, _, rest = path.partition("/")
-    found = owner.findall(first)
-    for child in found if first == "DisplayGeometry" else found[:1]:
+    result = owner.findall(first)
+    for child in result if first == "DisplayGeometry" else result[:1]:
         if rest:
             yield from _at(child, rest)
         else:
@@ -137,8 +137,8 @@ def _is_vector(size: int) -> Callable[[str], bool]:
     pattern = re.compile(rf"{numbers}|~?\s*\[\s*{numbers}\s*\]|~?\s*\(\s*{numbers}\s*\)")
 
     def reads(text: str) -> bool:
-        found = pattern.fullmatch(text)
-        return found is not None and not any(number and isinf(float(number)) for number in found.groups())
+        result = pattern.fullmatch(text)
+        return result is not None and not any(number and isinf(float(number)) for number in result.groups())
 
     return reads
 

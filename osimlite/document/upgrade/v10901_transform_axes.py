@@ -26,10 +26,10 @@ def transform_axes(draft: Draft) -> None:
                     draft.numbers[axes[3]],
                 )
             directions = _directions([text_of(axis, "axis") for axis in axes])
-            for place, direction in enumerate(directions):
-                name = f"{kind}{place + 1}"
-                if place < len(axes):
-                    _carry(draft, axes[place], spatial, name)
+            for index, direction in enumerate(directions):
+                name = f"{kind}{index + 1}"
+                if index < len(axes):
+                    _carry(draft, axes[index], spatial, name)
                 else:
                     padding = draft.add(spatial, "TransformAxis", source=old, name=name)
                     draft.add(padding, "axis", direction, source=old)
@@ -48,8 +48,8 @@ def _carry(draft: Draft, axis: Element, spatial: Element, name: str) -> None:
 
 def _directions(given: list[str | None]) -> list[str]:
     """The texts of three independent directions, of which the first are given."""
-    known = [reals(text, 3) or [float(word) for word in _UNIT[place]] for place, text in enumerate(given)]
-    texts = [text or " ".join(_UNIT[place]) for place, text in enumerate(given)]
+    known = [reals(text, 3) or [float(word) for word in _UNIT[index]] for index, text in enumerate(given)]
+    texts = [text or " ".join(_UNIT[index]) for index, text in enumerate(given)]
     if not known:
         return [" ".join(unit) for unit in _UNIT]
     if len(known) == 1:

@@ -18,7 +18,7 @@ def tool_controls(draft: Draft) -> None:
             else:
                 draft.remove(file)
             draft.changed(tool)
-        spring = next((found for tag in _SPRINGS if (found := tool.find(tag)) is not None), None)
+        spring = next((result for tag in _SPRINGS if (result := tool.find(tag)) is not None), None)
         if spring is not None and tool.tag == "ForwardTool":
             controller = draft.add(_controllers(draft, tool), "CorrectionController", source=spring)
             draft.add(controller, "kp", "16", source=spring)

@@ -30,18 +30,18 @@ def one_trial(draft: Draft) -> None:
     """What the first trial of inverse kinematics says is said by the tool."""
     for tool in draft.tagged("InverseKinematicsTool"):
         trials = tool.find("IKTrialSet")
-        found = [] if trials is None else trials.findall("objects/IKTrial")
-        if trials is None or not found:
+        result = [] if trials is None else trials.findall("objects/IKTrial")
+        if trials is None or not result:
             # A tool at the top, without a document around it, is taken as it is.
             if draft.numbers[tool]:
                 draft.refuse(tool, tool, "an InverseKinematicsTool without an IKTrialSet, which old versions had")
             continue
-        for child in list(found[0]):
+        for child in list(result[0]):
             if is_element(child):
                 draft.move(child, tool)
             else:
                 tool.append(child)
-        for extra in found[1:]:
+        for extra in result[1:]:
             draft.changed(tool, at=extra, lost=f"the trial '{extra.get('name', '')}'")
         draft.add(tool, "constraint_weight", "20", source=trials)
         draft.add(tool, "accuracy", "1e-05" if draft.version == 10500 else "0.0001", source=trials)

@@ -40,10 +40,10 @@ def joints(draft: Draft) -> None:
         wrapper = body.find("Joint")
         if wrapper is None:
             continue
-        found = elements(wrapper)
-        if found:
-            _settle(draft, found[0], body, objects)
-        for extra in found[1:]:
+        result = elements(wrapper)
+        if result:
+            _settle(draft, result[0], body, objects)
+        for extra in result[1:]:
             draft.changed(body, at=extra, lost=f"a second joint of the body, <{extra.tag}>")
         draft.remove(wrapper)
 

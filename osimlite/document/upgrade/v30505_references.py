@@ -22,8 +22,8 @@ _CONSTRAINTS = {
 def constraint_bodies(draft: Draft) -> None:
     """Constraints and springs between two bodies name them by path."""
     for constraint in draft.tagged(*_CONSTRAINTS):
-        found = [_to_body(draft, constraint, tag, f"socket_{tag}") for tag in _CONSTRAINTS[constraint.tag]]
-        if any(found):
+        result = [_to_body(draft, constraint, tag, f"socket_{tag}") for tag in _CONSTRAINTS[constraint.tag]]
+        if any(result):
             draft.changed(constraint)
 
 
@@ -61,8 +61,8 @@ def point_coordinates(draft: Draft) -> None:
     taken: dict[str, str] = {}
     for point in draft.tagged("ConditionalPathPoint", "MovingPathPoint"):
         axes = ("",) if point.tag == "ConditionalPathPoint" else ("x_", "y_", "z_")
-        found = [child for axis in axes if (child := point.find(f"{axis}coordinate")) is not None]
-        for child in found:
+        result = [child for axis in axes if (child := point.find(f"{axis}coordinate")) is not None]
+        for child in result:
             if paths is None:
                 paths = _coordinate_paths(draft)
             name = plain(child)
@@ -77,7 +77,7 @@ def point_coordinates(draft: Draft) -> None:
                     f"'{paths[name]}'",
                 )
             draft.rename(child, f"socket_{child.tag}")
-        if found:
+        if result:
             draft.changed(point)
 
 
@@ -106,8 +106,8 @@ def _path_by_opensim(draft: Draft, name: str) -> str:
             top = above
         return draft.numbers[top], top.tag == "JointSet", number, draft.numbers[element]
 
-    found = cast("list[Element]", draft.root.xpath("//*[@name=$name]", name=name))
-    wrapper = min(found, key=order).getparent() if found else None
+    result = cast("list[Element]", draft.root.xpath("//*[@name=$name]", name=name))
+    wrapper = min(result, key=order).getparent() if result else None
     above = None if wrapper is None else wrapper.getparent()
     if above is not None and above.tag == "CoordinateSet":
         above = above.getparent()

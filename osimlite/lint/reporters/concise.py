@@ -20,7 +20,7 @@ def render(report: Report, *, colour: bool = False, everything: bool = False) ->
 def _line(fold: Fold, colour: bool) -> str:
     finding = fold.first
     counts = (("like this", fold.more), ("in other files", fold.elsewhere))
-    more = "".join(f"; {len(found)} more {what}" for what, found in counts if found)
+    more = "".join(f"; {len(result)} more {what}" for what, result in counts if result)
     hint = f" (did you mean '{finding.suggestion}'?)" if finding.suggestion is not None else ""
     words = visible(f"{finding.message}{hint}{more}")
     severity = painted(finding.severity.value, finding.severity, colour)

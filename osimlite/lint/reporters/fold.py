@@ -33,15 +33,15 @@ class Fold(NamedTuple):
     @property
     def remarks(self) -> list[str]:
         """``91 more like this, on lines 12, 40 and 88 more``; nothing if there are none."""
-        found = []
+        result = []
         if self.more:
             lines = list(dict.fromkeys(str(finding.line) for finding in self.more if finding.line is not None))
             places = f", on line{'s' * (len(lines) > 1)} {listed(lines, most=4)}" if lines else ""
-            found.append(f"{len(self.more)} more like this{places}")
+            result.append(f"{len(self.more)} more like this{places}")
         if self.elsewhere:
             files = dict.fromkeys(os.path.basename(finding.file or "") for finding in self.elsewhere)
-            found.append(f"{len(self.elsewhere)} more in other files: {listed(files, most=3)}")
-        return found
+            result.append(f"{len(self.elsewhere)} more in other files: {listed(files, most=3)}")
+        return result
 
 
 def folded(findings: Iterable[Finding], *, everything: bool = False) -> list[Fold]:
@@ -54,17 +54,17 @@ def folded(findings: Iterable[Finding], *, everything: bool = False) -> list[Fol
         for group in _grouped(every, lambda finding: (finding.file, *_kind(finding, names=False)))
         for part in ([group] if len(group) >= _least(group[0]) else [[finding] for finding in group])
     ]
-    found: list[Fold] = []
+    result: list[Fold] = []
     # What other files say is the same only with the same names, unless there is one cause.
     for alike in _grouped(parts, lambda part: _kind(part[0], names=part[0].code not in _ONE_CAUSE)):
         first, *rest = [finding for part in alike for finding in part]
         if len({part[0].file for part in alike}) < _least(first):
-            found += [Fold(part[0], part[1:], []) for part in alike]
+            result += [Fold(part[0], part[1:], []) for part in alike]
         else:
             here = [finding for finding in rest if finding.file == first.file]
-            found.append(Fold(first, here, [finding for finding in rest if finding.file != first.file]))
+            result.append(Fold(first, here, [finding for finding in rest if finding.file != first.file]))
     place = {id(finding): number for number, finding in enumerate(every)}
-    return sorted(found, key=lambda fold: place[id(fold.first)])
+    return sorted(result, key=lambda fold: place[id(fold.first)])
 
 
 def _least(finding: Finding) -> int:

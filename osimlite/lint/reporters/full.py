@@ -18,8 +18,8 @@ def render(report: Report, *, colour: bool = False, width: int = 80, everything:
     """The report as text of at most `width` columns (but for places, which are never broken)."""
     blocks: list[str] = []
     every = folded(report.findings, everything=everything)
-    for file, found in groupby(every, key=lambda fold: fold.first.file):
-        folds = list(found)
+    for file, result in groupby(every, key=lambda fold: fold.first.file):
+        folds = list(result)
         lines = _lines(report, file, max(fold.first.line or 0 for fold in folds))
         blocks += [_block(fold, lines, colour, width) for fold in folds]
     closing, length = summary(report, colour), len(summary(report))

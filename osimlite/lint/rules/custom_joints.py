@@ -53,10 +53,10 @@ def made_up_coordinate(subject: Subject, found: Found) -> None:
         if axes_refused(joint):
             continue
         for axis in axes_of(joint):
-            for place, name in enumerate(axis.coordinates):
+            for index, name in enumerate(axis.coordinates):
                 if not isinstance(name, str) or name in declared:
                     continue
-                word, nth = subject.word_at(axis, "coordinates", place)
+                word, nth = subject.word_at(axis, "coordinates", index)
                 found(
                     f"{axis.name} of {called(joint)} names '{name}', which the joint does not declare: OpenSim makes a "
                     "coordinate of that name up",
@@ -118,8 +118,8 @@ def collinear_axes(subject: Subject, found: Found) -> None:
         for kind in (axes[:3], axes[3:]):
             # Of an axis with NaN in it OpenSim's comparison says nothing.
             kind = [axis for axis in kind if not any(map(math.isnan, axis.axis))]
-            for place, axis in enumerate(kind):
-                twin = next((other for other in kind[:place] if _parallel(axis.axis, other.axis)), None)
+            for index, axis in enumerate(kind):
+                twin = next((other for other in kind[:index] if _parallel(axis.axis, other.axis)), None)
                 # An axis without a length is parallel to every other one; the finding belongs to it.
                 short = math.hypot(*axis.axis) < _COLLINEAR
                 if short or (twin is not None and math.hypot(*twin.axis) >= _COLLINEAR):
@@ -185,15 +185,15 @@ def _parallel(one: Vector, other: Vector) -> bool:
 def _motion_by(joint: CustomJoint, coordinate: Coordinate) -> list[float]:
     """How fast each axis moves with a coordinate in the default pose; where nobody can tell, some number but 0."""
     values = {item.name: item.default_value for item in coordinates_of(joint)}
-    found = []
+    result = []
     for number, axis in enumerate(axes_of(joint)):
         names = names_on(axis)
         # Of a name that stands twice the last place counts.
         place = max((place for place, name in enumerate(names) if name == coordinate.name), default=None)
         known = 0.0 if place is None else _slope(axis.function, place, values.get(names[0], 0.0))
         # No combination of these numbers is 0 by chance.
-        found.append(math.sqrt(2 + number + 7 * (place or 0)) if known is None else known)
-    return found
+        result.append(math.sqrt(2 + number + 7 * (place or 0)) if known is None else known)
+    return result
 
 
 def _slope(function: Function | None, place: int, first: float) -> float | None:
@@ -226,7 +226,7 @@ def _rank(rows: list[list[float]]) -> int:
         rows[rank], rows[pivot] = rows[pivot], rows[rank]
         for below in rows[rank + 1 :]:
             share = below[column] / rows[rank][column]
-            for place in range(column, 6):
-                below[place] -= share * rows[rank][place]
+            for index in range(column, 6):
+                below[index] -= share * rows[rank][index]
         rank += 1
     return rank

@@ -228,13 +228,13 @@ def _domain(cls: type[Object], spec: FieldSpec) -> str:
 @cache
 def _domains(cls: type[Object]) -> tuple[tuple[FieldSpec, Callable[[float], bool]], ...]:
     """The properties of a class that have a domain, with the test for it."""
-    found = []
+    result = []
     for spec in value_specs(cls):
         assert isinstance(spec.kind, Value)
         domain = _domain(cls, spec)
         if domain and spec.kind.scalar in ("double", "int"):
-            found.append((spec, _test(domain)))
-    return tuple(found)
+            result.append((spec, _test(domain)))
+    return tuple(result)
 
 
 def _is_rigid(item: Object) -> bool:

@@ -160,7 +160,7 @@ def _should_have_name(subject: Subject, component: Component) -> bool:
 def _leading_nowhere(subject: Subject, component: Component) -> list[Broken]:
     """The broken references that a component of this class would mend if it had the right name."""
     parent = subject.tree.parent_of(component)
-    found = []
+    result = []
     for broken in broken_references(subject):
         use = broken.use
         # Of a group OpenSim drops what is missing, and a probe it switches off: neither needs the name to load.
@@ -175,8 +175,8 @@ def _leading_nowhere(subject: Subject, component: Component) -> list[Broken]:
             beside = f"{subject.path(component).rpartition('/')[0]}/{_last(broken.text)}"
             near = broken.why == "missing" and ("/" not in broken.text or broken.text == beside)
         if near:
-            found.append(broken)
-    return found
+            result.append(broken)
+    return result
 
 
 def _wanted_names(subject: Subject, component: Component) -> list[str]:

@@ -132,9 +132,9 @@ def _function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]:
     functions += [("moment_arm_functions", arm, count) for arm in arms]
     functions.append(("lengthening_speed_function", path.lengthening_speed_function, 2 * count))
     for tag, function, wanted in functions:
-        found = _arguments(function)
-        if found is not None and found != wanted:
-            yield tag, f"a function of its {tag} takes {counted(found, 'argument')} instead of {wanted}"
+        result = _arguments(function)
+        if result is not None and result != wanted:
+            yield tag, f"a function of its {tag} takes {counted(result, 'argument')} instead of {wanted}"
 
 
 def _arguments(function: Any) -> int | None:

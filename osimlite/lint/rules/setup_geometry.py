@@ -139,10 +139,10 @@ def _agreement(ways: list[list[float]]) -> list[float]:
     """The cosine of each direction with the mean of the others; NaN where there are few, or these do not agree."""
     known = [way for way in ways if way[0] == way[0]]
     whole = [sum(parts) for parts in zip(*known, strict=True)] or [0.0, 0.0, 0.0]
-    found = []
+    result = []
     for way in ways:
         rest = [total - part for total, part in zip(whole, way, strict=True)]
         length = math.hypot(*rest)
         agree = len(known) > 3 and length > 0.5 * (len(known) - 1)
-        found.append(sum(a * b for a, b in zip(way, rest, strict=True)) / length if agree else math.nan)
-    return found
+        result.append(sum(a * b for a, b in zip(way, rest, strict=True)) / length if agree else math.nan)
+    return result

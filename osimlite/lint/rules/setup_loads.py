@@ -53,8 +53,8 @@ def load_columns(setup: Setup, found: Found) -> None:
         prefixes = sorted({column[:-1] for column in columns if column[-1:] in "xyzXYZ"})
         forces = members(loads, "ExternalForce")
         names = [force.name for force in forces]
-        for place, force in enumerate(forces):
-            if force.name in names[:place]:
+        for index, force in enumerate(forces):
+            if force.name in names[:index]:
                 found(f"a force is called '{force.name}' already", force, attribute="name", severity=WARNING)
             if not str(force.applied_to_body):
                 found(f"{called(force)} acts on no body: OpenSim refuses it", force, tag="applied_to_body")
@@ -195,7 +195,7 @@ def _acting(setup: Setup, force: Any, table: Table | None, motion: Table) -> lis
     rows = [table.row_at(first + (last - first) * (k + 0.5) / _TIMES) for k in range(_TIMES)]
     rows = [row for row in rows if len(row) == len(table.labels) and not any(map(math.isnan, row))]
     sizes = [math.hypot(*(row[place] for place in places[0])) for row in rows]
-    found = []
+    result = []
     for row, size in zip(rows, sizes, strict=True):
         if size > max(20.0, 0.2 * max(sizes)):
             poses = poses_in(setup, motion, row[0])
@@ -207,5 +207,5 @@ def _acting(setup: Setup, force: Any, table: Table | None, motion: Table) -> lis
             if body is not None and of_force is not None and of_point is not None:
                 direction = (x / size, y / size, z / size)
                 away = math.dist(body.position, of_point.of((px, py, pz)))
-                found.append(_Push(away, math.hypot(*torque) / size, size, direction, of_force.turned(direction)))
-    return found
+                result.append(_Push(away, math.hypot(*torque) / size, size, direction, of_force.turned(direction)))
+    return result

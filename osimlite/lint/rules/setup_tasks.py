@@ -91,11 +91,11 @@ def unreachable_task(setup: Setup, found: Found) -> None:
     for user in setup.having("ik_task_set", "coordinate_file"):
         table = setup.table(user.coordinate_file)
         given: dict[str, list[float]] = {}
-        for place, column in enumerate(table.columns if table is not None else (), 1):
+        for index, column in enumerate(table.columns if table is not None else (), 1):
             # Whatever the header says, this file is taken to be in degrees.
             turn = math.pi / 180.0 if column in angles else 1.0
             rows = table.rows.samples if table is not None else []
-            given[column] = [row[place] * turn for row in rows if place < len(row) and row[place] == row[place]]
+            given[column] = [row[index] * turn for row in rows if index < len(row) and row[index] == row[index]]
         for task in user.ik_task_set.objects:
             coordinate = coordinates.get(task.name)
             if coordinate is None or not is_a(task, "IKCoordinateTask") or not task.apply:

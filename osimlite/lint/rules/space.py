@@ -231,7 +231,7 @@ def _on_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
 
     R. Tarjan's strongly connected components (1972), each looked at once.
     """
-    found: set[int] = set()
+    result: set[int] = set()
     number: dict[int, int] = {}
     lowest: dict[int, int] = {}
     path: list[Component] = []
@@ -250,7 +250,7 @@ def _on_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
             entering = next((item for item in below if id(item) not in number or id(item) in open_ids), None)
             if entering is not None and id(entering) in open_ids:
                 lowest[id(owner)] = min(lowest[id(owner)], number[id(entering)])
-                found |= {id(owner)} if entering is owner else set()
+                result |= {id(owner)} if entering is owner else set()
                 entering = None
             elif entering is None:
                 pending.pop()
@@ -262,8 +262,8 @@ def _on_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
                     circle = {id(item) for item in path[-size:]}
                     del path[-size:]
                     open_ids -= circle
-                    found |= circle if size > 1 else set()
-    return found
+                    result |= circle if size > 1 else set()
+    return result
 
 
 def _below(subject: Subject, item: Component) -> Iterator[Component]:

@@ -96,8 +96,8 @@ def _without_last_tabs(table: Table, width: int) -> Fix | None:
 
 def _without_blank_lines(table: Table, first: int) -> Fix:
     """The mend that takes out blank lines between rows, from a line on."""
-    found = _BLANK_LINES.finditer(table.data, table.line_start(first))
-    return Fix(tuple(Edit(*match.span(), "") for match in found))
+    result = _BLANK_LINES.finditer(table.data, table.line_start(first))
+    return Fix(tuple(Edit(*match.span(), "") for match in result))
 
 
 @rule("OSIM807", "not-a-number", severity=ERROR, about="table")

@@ -358,7 +358,7 @@ def column_label(table: Table, found: Found) -> None:
                     fault="frame-and-time-label",
                 )  # fmt: skip
         cells = header.lines[3].split("\t") if header.lines[3:] else []
-        empty = [place for place in range(2, len(cells) - 2, 3) if not cells[place].strip()]
+        empty = [index for index in range(2, len(cells) - 2, 3) if not cells[index].strip()]
         if empty and len(labels) < len(cells[2:]) // 3:
             found(
                 "a marker has no label: OpenSim refuses the file",

@@ -111,7 +111,7 @@ def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7
         )
     known, truth = random_poses(paths, poses, seed)
     lengths, arms, places = zip(*(theirs.measured(q) for q in known.q), strict=True)
-    found = []
+    result = []
     for name, tendon in tendons.items():
         own = truth[owners[name]]
         off = np.array(lengths)[:, tendon] - own.lengths
@@ -119,9 +119,9 @@ def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7
         by_coordinate = {theirs.names[place]: error for place, error in turned.items()}
         muscle = model.tree().by_path[owners[name]]
         more = theirs.strength(name, muscle, own.lengths) if isinstance(muscle, Muscle) else {}
-        found.append(MuscleCheck(name, Error.of(off, "m"), by_coordinate, **more))
+        result.append(MuscleCheck(name, Error.of(off, "m"), by_coordinate, **more))
     return Check(
-        tuple(found),
+        tuple(result),
         tuple(name for name in owners if name not in tendons),
         tuple(theirs.names[place] for place in theirs.free if place not in theirs.joints),
         _apart(theirs, known.origins, places),
@@ -219,9 +219,9 @@ def _apart(theirs: _Compiled, origins: Array, places: Sequence[Array]) -> Error 
     if len(theirs.bodies) < 3:
         return None
     off = []
-    for pose, found in enumerate(places):
+    for pose, result in enumerate(places):
         wanted = origins[list(theirs.bodies), pose]
-        a, b = found - found.mean(0), wanted - wanted.mean(0)
+        a, b = result - result.mean(0), wanted - wanted.mean(0)
         left, _, right = np.linalg.svd(a.T @ b)
         flip = np.diag((1.0, 1.0, np.sign(np.linalg.det(left @ right))))
         off.append(np.linalg.norm(a @ left @ flip @ right - b, axis=1))

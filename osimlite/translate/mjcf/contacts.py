@@ -115,7 +115,7 @@ def _surfaces(draft: Draft, force: ContactForce) -> Iterator[tuple[ContactGeomet
     for parameters in force.contact_parameters.objects:
         spec = type(parameters).field_specs()["geometry"]
         for position, word in enumerate(parameters.geometry):
-            found = draft.tree.resolve(Use(parameters, force, spec, word, position)).target
-            if not isinstance(found, ContactGeometry):
+            result = draft.tree.resolve(Use(parameters, force, spec, word, position)).target
+            if not isinstance(result, ContactGeometry):
                 raise ModelError(f"it names the contact geometry '{word}', which the model does not have")
-            yield found, parameters.dynamic_friction
+            yield result, parameters.dynamic_friction

@@ -195,8 +195,8 @@ class Draft:
 
     def section(self, tag: str) -> _Element:
         """The part of the file with this tag: ``tendon``, ``actuator``, ``equality`` ..."""
-        found = self.root.find(tag)
-        return add(self.root, tag) if found is None else found
+        result = self.root.find(tag)
+        return add(self.root, tag) if result is None else result
 
     def name(self, kind: str, path: str) -> str:
         """A name for a component, unlike any other of this kind: its own, or its path with dots where that is taken.

@@ -72,11 +72,11 @@ class Mjcf:
         """Values (rad, m) of all joints by name at coordinate values `q`, exact where equalities are fitted."""
         values = self.robot.mechanism.values(q)
         leads = {joint: line.slope * values[place] + line.start for place, (joint, line) in self.leads.items()}
-        found = leads | self.robot.joint_values(values)
+        result = leads | self.robot.joint_values(values)
         for joint, follower in self.followers.items():
-            if joint not in found:
-                found[joint] = float(polyval(found[follower.leader or ""], follower.polynomial))
-        return found
+            if joint not in result:
+                result[joint] = float(polyval(result[follower.leader or ""], follower.polynomial))
+        return result
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write ``<name>.xml``, its meshes and ``fidelity.json`` into a folder, which is made if it is not there.

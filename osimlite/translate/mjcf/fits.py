@@ -33,12 +33,12 @@ def fitted(router: Router, tendon: Tendon) -> Tendon:
     """
     if router.error(tendon) < GOOD:
         return tendon
-    fixed = [place for place, part in enumerate(tendon) if isinstance(part, Spot) and part.name]
+    fixed = [index for index, part in enumerate(tendon) if isinstance(part, Spot) and part.name]
     for first, last in reversed(list(pairwise(fixed))):
         piece = tendon[first : last + 1]
         if any(map(_is_free, piece)):
-            found = _search(piece, router.but_for(tendon, piece))
-            tendon = (*tendon[:first], *found, *tendon[last + 1 :])
+            result = _search(piece, router.but_for(tendon, piece))
+            tendon = (*tendon[:first], *result, *tendon[last + 1 :])
     return tendon
 
 
@@ -50,10 +50,10 @@ def _search(piece: Tendon, wrong: Wrong) -> Tendon:
         start = best
         size = sum(7 if isinstance(part, Around) else 3 for part in start if _is_free(part))
         guess = search(lambda x, t=start: 1e3 * wrong(_moved(t, x)).ravel(), np.zeros(size), max_nfev=40)
-        found = _sided(_moved(start, guess.x), wrong)
-        error = _error(wrong(found))
+        result = _sided(_moved(start, guess.x), wrong)
+        error = _error(wrong(result))
         if error < least:
-            best = found
+            best = result
         if not error < WORTH * least:
             break
         least = error
@@ -68,9 +68,9 @@ def _sided(piece: Tendon, wrong: Wrong) -> Tendon:
     """The piece with the best side for each surface."""
     turns = np.arange(SIDES) * (2.0 * np.pi / SIDES)
     directions = np.stack((np.cos(turns), np.sin(turns), 0.0 * turns), axis=1)
-    for place, part in enumerate(piece):
+    for index, part in enumerate(piece):
         if isinstance(part, Around) and _is_free(part):
-            options = [(*piece[:place], part.sided(way), *piece[place + 1 :]) for way in (None, *directions)]
+            options = [(*piece[:index], part.sided(way), *piece[index + 1 :]) for way in (None, *directions)]
             piece = min((piece, *options), key=lambda option: _error(wrong(option)))
     return piece
 

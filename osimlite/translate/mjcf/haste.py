@@ -93,17 +93,17 @@ def _fastest(draft: Draft) -> float:
 def _slopes(draft: Draft, elements: Sequence[ForceElement], along: Array, at: Array) -> Array:
     """Derivatives (n, f) of generalized forces by steps along coordinates and speeds, each (n, f)."""
     q, u = draft.default_state
-    found = np.zeros_like(along)
+    result = np.zeros_like(along)
     if elements:
         system = System(draft.mechanism, Forces(tuple(elements)))
         places = list(system.order)
 
         def forces(nudge: float, k: int) -> Array:
-            row = np.zeros(len(found))
+            row = np.zeros(len(result))
             y = system.state.pack((q + nudge * along[:, k]).tolist(), (u + nudge * at[:, k]).tolist())
             row[places] = system.applied(0.0, y)[len(places) : 2 * len(places)]
             return row
 
-        for k in range(found.shape[1]):
-            found[:, k] = (forces(NUDGE, k) - forces(-NUDGE, k)) / (2.0 * NUDGE)
-    return found
+        for k in range(result.shape[1]):
+            result[:, k] = (forces(NUDGE, k) - forces(-NUDGE, k)) / (2.0 * NUDGE)
+    return result

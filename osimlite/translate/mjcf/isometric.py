@@ -41,11 +41,11 @@ def isometric_tension(force: Any, lengths: Array, activations: Sequence[float]) 
         model.add(brain)
     mechanism = build_mechanism(model)
     system = System(mechanism, force_elements(model, mechanism))
-    found = np.full((len(activations), len(lengths)), np.nan)
-    for row, activation in zip(found, activations, strict=True):
+    result = np.full((len(activations), len(lengths)), np.nan)
+    for row, activation in zip(result, activations, strict=True):
         start = [activation if variable.path.endswith("/activation") else 0.1 for variable in system.state.variables]
-        for place, length in enumerate(lengths.tolist()):
+        for index, length in enumerate(lengths.tolist()):
             with suppress(SimulationError):
                 state = system.equilibrated(activation, [length, 0.0, *start])
-                row[place] = system.force_records(activation, state)[0]
-    return found
+                row[index] = system.force_records(activation, state)[0]
+    return result

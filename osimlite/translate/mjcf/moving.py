@@ -50,13 +50,13 @@ def _composition(functions: tuple[Function, ...], span: tuple[float, float]) -> 
         reached = powers @ bent
         middle, half = 0.5 * (reached.max() + reached.min()), 0.5 * (reached.max() - reached.min())
         bent[0] -= middle
-        found: Array = bent / half
-        return found
+        result: Array = bent / half
+        return result
 
     def second(bends: Array) -> tuple[Array, Array]:
         basis = np.polynomial.chebyshev.chebvander(powers @ first(bends), DEGREE)
-        found: Array = np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], dtype=np.float64)
-        return found, (basis @ found - values).ravel()
+        result: Array = np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], dtype=np.float64)
+        return result, (basis @ result - values).ravel()
 
     search = require("scipy.optimize", extra="sim", purpose="fits of moving points").least_squares
     best = min((search(lambda bends: 1e3 * second(bends)[1], start) for start in STARTS), key=lambda each: each.cost)

@@ -71,8 +71,8 @@ class Curves(NamedTuple):
 
     def tension(self, lengths: Array, activation: float) -> Array:
         """Tension (L,) that MuJoCo gives the muscle at lengths of its tendon (L,), m, at rest."""
-        found: Array = self.tensions(lengths, (activation,))[0]
-        return found
+        result: Array = self.tensions(lengths, (activation,))[0]
+        return result
 
     def tensions(self, lengths: Array, activations: Sequence[float] = ACTIVATIONS) -> Array:
         """Tensions (A, L) at several activations, by default those that are compared."""
@@ -85,8 +85,8 @@ class Curves(NamedTuple):
         active[(x < self.lmin) | (x > self.lmax)] = 0.0
         stretch = np.maximum(x - self.shift - 1.0, 0.0) / (0.5 * (1.0 + self.end) - 1.0)
         passive = self.fpmax * np.where(stretch <= 1.0, 0.5 * stretch**2, stretch - 0.5)
-        found: Array = self.force * (np.multiply.outer(activations, active) + passive)
-        return found
+        result: Array = self.force * (np.multiply.outer(activations, active) + passive)
+        return result
 
     @classmethod
     def read(cls, lengthrange: Array, gain: Array, bias: Array) -> Curves:
@@ -182,14 +182,14 @@ def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curv
         return Curves(*moved, lmin, lmax, end, fpmax, shift)
 
     def off(x: Array) -> Array:
-        found: Array = ((curves(x).tensions(lengths) - tensions) / own.force)[known]
-        return found
+        result: Array = ((curves(x).tensions(lengths) - tensions) / own.force)[known]
+        return result
 
     start, low, high = [own.lmin, own.lmax, own.end, own.fpmax], list(LEAST), list(GREATEST)
     if free:
         start, low, high = [*start, *[0.0] * 4], [*low, *[-FREE] * 4], [*high, *[FREE] * 4]
     # The curves have kinks: the way from one start may end at one.
     starts = start, [0.2, 2.2, *start[2:]]
-    found = [search(off, each, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for each in starts]
-    best = min(found, key=lambda each: each.cost)
+    result = [search(off, each, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for each in starts]
+    best = min(result, key=lambda each: each.cost)
     return curves(best.x)

@@ -86,13 +86,13 @@ def _what(route: ThroughPoints, router: Router) -> str:
     """What of a path MuJoCo has no exact words for."""
     kinds = {point.kind for point in route.points}
     touched = [surface for surface, touch in zip(route.surfaces, router.touches, strict=True) if len(touch.poses)]
-    found = [
+    result = [
         *(["a point that moves with a coordinate"] if MOVING in kinds else []),
         *(["a point that comes and goes with a coordinate"] if CONDITIONAL in kinds else []),
         *sorted({f"a {_NAMES[surface.law]}" for surface in touched}),
     ]
     several = ", several at a time" if len(touched) > 1 else ""
-    return "a path with " + " and ".join(found or ["surfaces"]) + several
+    return "a path with " + " and ".join(result or ["surfaces"]) + several
 
 
 _NAMES = {

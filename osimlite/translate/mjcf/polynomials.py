@@ -70,10 +70,10 @@ def quartic(function: f.Function, span: tuple[float, float], unit: str) -> Fit:
     weights, best, least = np.full(_SAMPLES, 1.0 / _SAMPLES), np.zeros(DEGREE + 1), np.inf
     for _ in range(60):
         root = np.sqrt(weights)
-        found = np.linalg.lstsq(root[:, None] * basis, root * y, rcond=None)[0]
-        off = np.abs(basis @ found - y)
+        result = np.linalg.lstsq(root[:, None] * basis, root * y, rcond=None)[0]
+        off = np.abs(basis @ result - y)
         if off.max() < least:
-            best, least = found, off.max()
+            best, least = result, off.max()
         if not off.any():
             break
         weights *= off

@@ -91,12 +91,12 @@ def each_pose(rows: Array, matrices: Array) -> Array:
 
 def arm_errors(mechanism: Mechanism, arms: Array, truth: Truth) -> dict[int, Error]:
     """How far moment arms (P, m) are off, by the place of the coordinate, where a path or its stand-in has one."""
-    found = {}
+    result = {}
     for place, off, wanted in zip(free_coordinates(mechanism), (arms - truth.arms).T, truth.arms.T, strict=True):
         if np.abs(off).max() > EXACT or np.abs(wanted).max() > EXACT:
             rotational = mechanism.coordinates[place].motion_type == "rotational"
-            found[place] = Error.of(off, "m" if rotational else "1")
-    return found
+            result[place] = Error.of(off, "m" if rotational else "1")
+    return result
 
 
 def random_values(mechanism: Mechanism, count: int, seed: int) -> Array:
@@ -121,9 +121,9 @@ def free_coordinates(mechanism: Mechanism) -> list[int]:
     """Places of the coordinates that are neither locked, prescribed nor coupled to others."""
     coupled = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
     return [
-        place
-        for place, info in enumerate(mechanism.coordinates)
-        if not info.locked and info.prescribed is None and place not in coupled
+        index
+        for index, info in enumerate(mechanism.coordinates)
+        if not info.locked and info.prescribed is None and index not in coupled
     ]
 
 

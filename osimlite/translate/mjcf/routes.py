@@ -120,14 +120,14 @@ class Router:
 
     def _touch(self, number: int) -> Touch:
         one = len(self.route.points) + 2 * number
-        body, found = self.route.surfaces[number].tangent.body, []
+        body, result = self.route.surfaces[number].tangent.body, []
         for pose, nodes in enumerate(self.truth.nodes):
             last = 0
             for (node, place), (_, after) in pairwise(nodes):
                 last = node if node < len(self.route.points) else last
                 if node == one:
-                    found.append((pose, place, after, last))
-        poses, first, second, before = zip(*found, strict=True) if found else ((), (), (), ())
+                    result.append((pose, place, after, last))
+        poses, first, second, before = zip(*result, strict=True) if result else ((), (), (), ())
         at = np.array(poses, dtype=int)
         return Touch(
             at, self._in_body(body, at, np.array(first)), self._in_body(body, at, np.array(second)), np.array(before)
@@ -135,10 +135,10 @@ class Router:
 
     def _in_body(self, body: int, at: Places, places: Array) -> Array:
         """Places in ground (k, 3) in some of the poses, in the frame of a body."""
-        found: Array = np.einsum(
+        result: Array = np.einsum(
             "pji,pj->pi", self.poses.rotations[body][at], places.reshape(-1, 3) - self.poses.origins[body][at]
         )
-        return found
+        return result
 
     # ----------------------------------------------------------------------------------------------- options
     def _around(self, numbers: Sequence[int], choose: Choose) -> Tendon:
@@ -153,9 +153,9 @@ class Router:
             ]
             if not options:
                 continue
-            (found,) = choose(options)
-            assert isinstance(found, Around)
-            best[number] = found
+            (result,) = choose(options)
+            assert isinstance(result, Around)
+            best[number] = result
         options = [(), *((each,) for each in best.values())]
         for (one, first), (two, second) in combinations(best.items(), 2):
             for middle in self._between(one, two):
@@ -166,8 +166,8 @@ class Router:
     def _touched(self, number: int) -> Array:
         """The tangent points (2 k, 3) on a surface, in its own frame."""
         touch, frame = self.touches[number], self.route.surfaces[number].tangent.frame
-        found: Array = (np.concatenate((touch.first, touch.second)) - frame[:3, 3]) @ frame[:3, :3]
-        return found
+        result: Array = (np.concatenate((touch.first, touch.second)) - frame[:3, 3]) @ frame[:3, :3]
+        return result
 
     def _sides(self, number: int, around: Around, directions: int) -> Iterator[Around]:
         """As it is, or with the side of the quadrant, the side that is touched, or one of the directions all around."""
@@ -187,11 +187,11 @@ class Router:
     def _turn(self, number: int, numbers: Sequence[int]) -> list[int]:
         """Where a surface stands in the order of those that the path touches, in each pose."""
         points = len(self.route.points)
-        found = []
+        result = []
         for pose in self.touches[number].poses:
             order = [(node - points) // 2 for node, _ in self.truth.nodes[pose] if node >= points]
-            found.append([k for k in dict.fromkeys(order) if k in numbers].index(number))
-        return found
+            result.append([k for k in dict.fromkeys(order) if k in numbers].index(number))
+        return result
 
     def _between(self, one: int, two: int) -> Iterator[Spot]:
         """Sites between two surfaces: in the body of either, halfway between the points where they are touched."""
@@ -284,7 +284,7 @@ def _is_tendon(tendon: Tendon) -> bool:
 
 def _last_spot(tendon: Tendon) -> int:
     """Place of the last site; 0 if there is none."""
-    return max((place for place, part in enumerate(tendon) if isinstance(part, Spot)), default=0)
+    return max((index for index, part in enumerate(tendon) if isinstance(part, Spot)), default=0)
 
 
 def _joined(slots: Sequence[Tendon]) -> Tendon:

@@ -132,18 +132,18 @@ def _section(first: Spot, arounds: Sequence[Around], second: Spot, poses: Poses,
         start, end = ((poses.stations(body, at) - middles) @ rotations for at in (one, two))
         sides = [_station(around.side, body, poses) for around in arounds if around.side is not None]
         sites = (np.stack(sides) - middles[owners]) @ rotations[owners] if sides else None
-        found = bend(kind, radii, start, end, sites, owners, version)
+        result = bend(kind, radii, start, end, sites, owners, version)
         # Each way around each surface is one of the k, until they are chosen.
-        touches = found.touches.reshape(-1, len(poses.q))
+        touches = result.touches.reshape(-1, len(poses.q))
         leaves, returns = (
             poses.points(body, (middles + at @ rotations.swapaxes(1, 2)).reshape(*touches.shape, 3))
-            for at in (found.first, found.second)
+            for at in (result.first, result.second)
         )
         way, back = leaves - one, returns - two
-        lengths = np.where(touches, found.length.reshape(touches.shape) + norm(back), 0.0)
+        lengths = np.where(touches, result.length.reshape(touches.shape) + norm(back), 0.0)
         for place, pull in ((leaves, way), (returns, back)):
             arms = arms - _worked(body, place, np.where(touches[..., None], unit(pull), 0.0), poses)
-        chosen = found.choice * len(frames) + owners[:, None], np.arange(len(poses.q))
+        chosen = result.choice * len(frames) + owners[:, None], np.arange(len(poses.q))
     for spot, place, pull in ((first, one, unit(way)), (second, two, unit(back))):
         arms = arms + _worked(spot.body, place, pull, poses)
         if spot.slides is not None:
@@ -191,5 +191,5 @@ def _slid(spot: Spot, force: Array, poses: Poses) -> Array:
     value = poses.q[:, spot.coordinate]
     helper, rate = polyval(value, spot.drive), polyval(value, polyder(spot.drive))
     rates = np.einsum("pij,jp->pi", poses.rotations[spot.body], polyval(helper, polyder(spot.slides.T)) * rate)
-    found: Array = np.einsum("kpi,pi->kp", force, rates)[..., None] * poses.rates[:, spot.coordinate]
-    return found
+    result: Array = np.einsum("kpi,pi->kp", force, rates)[..., None] * poses.rates[:, spot.coordinate]
+    return result

@@ -139,8 +139,8 @@ def _cut(p: Array, one: Array, q: Array, two: Array) -> Mask:
     across = _cross(way, other)
     across = np.where(np.abs(across) < TINY, np.nan, across)
     along, back = _cross(apart, other) / across, _cross(apart, way) / across
-    found: Mask = (along >= 0.0) & (along <= 1.0) & (back >= 0.0) & (back <= 1.0)
-    return found
+    result: Mask = (along >= 0.0) & (along <= 1.0) & (back >= 0.0) & (back <= 1.0)
+    return result
 
 
 def _plane(first: Array, second: Array) -> Array:
@@ -161,20 +161,20 @@ def _in(across: Array | None, points: Array) -> Array:
 
 
 def _dot(a: Array, b: Array) -> Array:
-    found: Array = np.einsum("...i,...i->...", a, b)
-    return found
+    result: Array = np.einsum("...i,...i->...", a, b)
+    return result
 
 
 def norm(a: Array) -> Array:
     """Lengths (...) of vectors (..., 3)."""
-    found: Array = np.sqrt(_dot(a, a))
-    return found
+    result: Array = np.sqrt(_dot(a, a))
+    return result
 
 
 def unit(a: Array) -> Array:
     """Vectors (..., 3) of length 1; zero where they are."""
-    found: Array = a / np.maximum(norm(a), np.finfo(float).tiny)[..., None]
-    return found
+    result: Array = a / np.maximum(norm(a), np.finfo(float).tiny)[..., None]
+    return result
 
 
 def _angle(a: Array, b: Array) -> Array:
