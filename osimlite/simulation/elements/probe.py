@@ -31,7 +31,7 @@ from osimlite.simulation.states import StateVariable
 from osimlite.text import did_you_mean
 
 HEAD = layout.OWN + 5
-"""Where the integers of the subjects begin."""
+"""Offset of the integers that tell what a probe reads, after those of its own."""
 
 INTEGRATE = "integrate"
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _log = logging.getLogger(__name__)
 
 _addresses: dict[str, int] = {}
-"""Of the laws that are ready."""
+"""Addresses of the machine code of the laws that are ready, by their names."""
 
 
 def address_of(name: str) -> int:

@@ -64,7 +64,8 @@ COUNT, SOLVER, ELEMENTS = OWN + 1, OWN + 2, OWN + 3
 """Integers of a cable: how many elements it has, where in its record room for the search is, and the elements."""
 ELEMENT_INTS = 4
 IS_OBSTACLE, LINK, AT, KEPT = 0, 1, 2, 3
-"""Of an element: whether it is an obstacle or a point; its link; where its numbers and its part of the record are."""
+"""Integers of an element of a cable: whether it is an obstacle or a point; its link; where its numbers and its part of
+the record are."""
 FIRST = 3
 """Where the parts of the record begin."""
 
@@ -87,7 +88,7 @@ OBSTACLE_WORK = GROUND_END + END_NUMBERS
 TOUCHES, GUESSED, LIFTED = 0.0, 1.0, 2.0
 
 UNKNOWNS, EQUATIONS = 4, 5
-"""Of an obstacle."""
+"""Unknowns of each obstacle in the search for a cable (its geodesic has four variations), and its equations."""
 SMOOTH, LARGEST, ROUNDS = 1e-5, radians(10.0), 50
 """The search ends at this angle, turns an end by no more than this, and has so many rounds."""
 SIGNIFICANT = 2.0**-45.5

@@ -35,17 +35,17 @@ or a square and weights: the surface is where the square is the weighted sum of 
 SURFACE_NUMBERS = 6
 
 POINT, ALONG, NORMAL, ACROSS, ALONG_BENDS, ACROSS_BENDS, TORSION = 0, 3, 6, 9, 12, 13, 14
-"""Of an end of a geodesic: where it is; its direction along the geodesic, out of the surface, and across both; the
-curvatures along and across, and the torsion."""
+"""Numbers of an end of a geodesic: where it is; its direction along the geodesic, out of the surface, and across both;
+the curvatures along and across, and the torsion."""
 END_NUMBERS = 15
 
 START, END, A, R, A_RATE, R_RATE, ARC, STEP = 0, 15, 30, 31, 32, 33, 34, 35
-"""Of a geodesic: its ends; the Jacobi fields at the end, and their derivatives; its length, m; the step of the
+"""Numbers of a geodesic: its ends; the Jacobi fields at the end, and their derivatives; its length, m; the step of the
 integration to begin with, m; 0 to integrate by extrapolation, as exactly as may be."""
 GEODESIC_NUMBERS = 36
 
 SIZE = 10
-"""Of the state that is integrated: place, R, A, and their derivatives."""
+"""Length of the state that is integrated along a geodesic: position, R, A, and their derivatives."""
 COLUMNS = 7
 GEODESIC_ROOM = (3 + COLUMNS) * SIZE
 """Of room for an integration: columns of the extrapolation, or what a step of Merson's takes."""

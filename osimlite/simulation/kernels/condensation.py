@@ -41,7 +41,7 @@ from osimlite.simulation.kernels.least_squares import cholesky, substitute
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
 MOST_STATES = 3
-"""So many states a force may have."""
+"""A force has at most so many states that are condensed."""
 WIDTH = 2 + MOST_STATES
 """Length of a row of derivatives: by displacement, speed and states. The rows are of the force and of the rates."""
 INVERSE = (1 + MOST_STATES) * WIDTH
@@ -57,10 +57,10 @@ SLIGHT = 1e-12
 """What counts as rounding among generalized forces of 1 N."""
 
 KERNEL, ITEM, FIRST_STATE, STATES, SENSE = 0, 1, 2, 3, 4
-"""Of the integers of a response."""
+"""Integers of a response: its kernel, its item, its first state and their count, and the sense in which it pulls."""
 
 HEAVY = 1e6
-"""Of constraints: what a unit of an equation weighs, in terms of the largest mass."""
+"""Weight of constraints: what a unit of an equation weighs, in terms of the largest mass."""
 
 
 def condensation_room(size: int, responses: int) -> int:

@@ -62,11 +62,12 @@ from osimlite.simulation.kernels.motion import move, place
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
 SMALLEST_PIVOT = 1e-13
-"""What of the inertia that a speed moves must be left after all others that it carries are free."""
+"""Part of the inertia about a degree of freedom that must remain once the joints further out are free; with less it
+moves no mass."""
 
 
 def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) -> int:
-    """The derivative f of the state y = (q, u, z); what else there is to know stays in `w`. Nothing depends on z.
+    """The derivative f of the state y = (q, u, z): positions, speeds, auxiliary states. All else stays in `w`.
 
     Returns:
         OK or what went wrong; with SINGULAR_MASS, f[0] is the degree of freedom that moves no mass.

@@ -113,7 +113,7 @@ def polynomial(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
 
 
 def formula(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Of an ExpressionBasedFunction.
+    """Value and derivatives of an ExpressionBasedFunction.
 
     After its arguments stand the programs of the value and of the derivatives, if these are asked for: the count of
     steps, the place of the constants, and the steps. The registers are in the record.

@@ -79,13 +79,13 @@ CHAIN, BEST, SEARCH, POSES = 0, 1, 2, 3
 the poses of the surfaces."""
 HOW, ABOUT, POSE_NUMBERS = 12, 13, 16
 NOT = 0.0
-"""Of a surface: after its rotation by rows and its place in ground, how it may bend the piece at hand, see `start`, and
-about what axis that turns."""
+"""Numbers of the pose of a surface: after its rotation by rows and its place in ground, how it may bend the piece at
+hand, see `start`, and about what axis that turns."""
 
 TOUCH = 1e-10
 """The angle (rad) by which a piece turns at least around a surface that it is put on."""
 WHOLE = 10.0
-"""More than any such angle."""
+"""Added to the angle of surfaces with a side, which come first: no piece turns by so much (rad)."""
 INSIDE = 1e-14
 """A point counts as inside a surface if it is so far below it, in units of its function."""
 WAYS, NEARLY = 16, 0.97

@@ -64,11 +64,11 @@ AS_MEANT, ANY_SIDE, PULLED = 1.0, 2.0, 3.0
 ellipsoid where a string comes to lie."""
 
 LEAST = 1e-100
-"""What is not divided by."""
+"""Denominators are at least this, so that nothing is divided by zero."""
 SAMPLES, STEPS = 16, 6
 """The place of a line that is nearest to a ring is found among so many, and made exact in so many steps."""
 NEAR_MIDDLE = 0.3
-"""Squared, by radii: as `depth` tells it."""
+"""A line goes through near the middle of a sphere if its squared distance, in radii (see `depth`), is less."""
 WAYS, WORTHWHILE = 16, 1.5
 """So many directions across a line are tried on an ellipsoid; the next best is worth trying if the line is at most so
 much deeper there."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 # Integers: a head with counts and places, then records.
 LINKS, FREEDOMS, ITEMS, CONTACTS = 0, 1, 2, 3
-"""Counts."""
+"""How many there are: links, degrees of freedom, items (forces and the like), contacts."""
 LINK_AT, OPERATION_AT, FREEDOM_AT, ITEM_AT = 4, 5, 6, 7
 """Places of the records in s; at ITEM_AT are the places of the items' records."""
 SUMMED, SUMMED_AT = 8, 9
@@ -26,7 +26,7 @@ FIXED_AT = 10
 (K, FIXED_NUMBERS)."""
 FIXED_NUMBERS = 15
 WORK_LINK, WORK_OPERATION, WORK_COLUMN, WORK_PIVOT, WORK_CONTACT, WORK_STATE = 11, 12, 13, 14, 15, 16
-"""Places in w."""
+"""Offsets in the work vector w of what is computed for links, operations, columns, pivots, contacts and states."""
 WORK_SIZE = 17
 """Length of w."""
 CONTACT_AT = 18
@@ -53,14 +53,14 @@ LAWS = 28
 
 LINK_INTS = 5
 PARENT, FIRST_OPERATION, END_OPERATION, FIRST_FREEDOM, END_FREEDOM = 0, 1, 2, 3, 4
-"""Of a link; -1 is ground."""
+"""Integers of a link: its parent (-1 is ground), the ranges of its operations and of its degrees of freedom."""
 
 OPERATION_INTS = 8
 MOTION, BEFORE, FREEDOM, FUNCTION, ARGUMENTS, ARGUMENT_COUNT, EXTRA, GRADIENT = 0, 1, 2, 3, 4, 5, 6, 7
-"""Of an operation: its motion, the kind of its fixed transform, the degree of freedom that is its amount or -1, the law
-that gives the amount otherwise or the motion of a ball; place and number of the arguments in s (degrees of freedom, -1
-for a number that does not change); place in x of the radii, or of the values of such arguments and the table of the
-function after them; place in w of the gradient."""
+"""Integers of an operation, one motion of a joint: its motion, the kind of its fixed transform, the degree of freedom
+that is its amount or -1, the law that gives the amount otherwise or the motion of a ball; place and number of the
+arguments in s (degrees of freedom, -1 for a number that does not change); place in x of the radii, or of the values of
+such arguments and the table of the function after them; place in w of the gradient."""
 
 ALONE, TOGETHER = -1, -2
 """In the place of the law: the column of the degree of freedom comes from this operation only, or from several."""
@@ -126,12 +126,13 @@ yz) and wrench of it, and of all that it carries too after the evaluation."""
 
 OPERATION_WORK = 16
 AXIS, POINT, AMOUNT, RATE, CURVATURE = 0, 9, 12, 13, 14
-"""Of an operation: the axis, or the frame by rows whose axes a ball's speeds are about; where that is; amount, rate and
-second derivative without udot, if a function gives them."""
+"""Work of an operation: the axis, or the frame by rows whose axes a ball's speeds are about; where that is; amount,
+rate and second derivative without udot, if a function gives them."""
 
 CONTACT_WORK = 8
 FORCE, DEPTH_OF, RADIUS_OF = 0, 6, 7
-"""Of a contact: force on surface 2, its point, depth and radius of the law; force and depth are 0 without contact."""
+"""Work of a contact: force on surface 2, its point, depth and radius of the law; force and depth are 0 without
+contact."""
 
 # Kinds.
 TURN, SLIDE, BALL, BALL_BACK, DRIFT = 0, 1, 2, 3, 4

@@ -34,7 +34,7 @@ LAWS_OF_FUNCTIONS = {
     MONOMIALS_OF_OPENSIM: "amount_by_several",
     ARC: "amount_by_arc",
 }
-"""Of functions of several coordinates."""
+"""The law of each kind of function that takes several coordinates."""
 
 
 @dataclass

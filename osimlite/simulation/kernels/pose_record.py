@@ -40,7 +40,7 @@ ROWS, ERRORS, ROOM = 21, 22, 23
 HISTORY, TRIAL, STEP = 24, 25, 26
 """How many poses are kept, and these, the last first; a state; a step (n,)."""
 RANGES_AT = 27
-"""Place of the ranges in the numbers."""
+"""Offset of the ranges of the coordinates in the numbers."""
 PATTERN = 28
 """Place in the work of the weights in the frame before, behind which is 1 if they leave some poses alike, else 0."""
 CURVES = 29

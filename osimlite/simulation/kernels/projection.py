@@ -43,7 +43,7 @@ from osimlite.simulation.kernels.trigonometry import sine_cosine
 OVERSHOOT = 0.1
 """The part of the tolerance that a projection aims at."""
 FINEST = 2.0 ** (-52.0 * 7.0 / 8.0)
-"""What counts as exact."""
+"""Errors of constraints below this are rounding: Simbody's significant part of a double (Real), eps^(7/8)."""
 REDUNDANT = 2.0**-26
 """Times the number of equations: how nearly one must follow from others to be dropped."""
 ITERATIONS = 20

@@ -32,7 +32,7 @@ TIME_OF_EVENT = 1e-9
 """How exactly the time of an event is found on the interpolated motion, s."""
 
 TAKEN, ATTEMPTED, EVALUATIONS, REPORTED, LOGGED, EVENTS = 0, 1, 2, 3, 4, 5
-"""Places of the counts."""
+"""Indices of what a run counts: steps taken and attempted, evaluations, rows reported and logged, events."""
 
 COORDINATE, HEIGHT, TOUCH = 0, 1, 2
 """Kinds of watches: on the value of a coordinate, on how far a point lies along a direction, on a contact."""

@@ -31,7 +31,7 @@ HEAD, IS_IMPLICIT = MEMORY + 1, True
 
 STAGES = 4
 STATES = STAGES
-"""Room for so many states."""
+"""The method keeps a derivative for each stage: so many vectors as long as a state."""
 
 DIAGONAL = 4.3586652150845900e-01
 ALPHA = (

@@ -12,7 +12,7 @@ def copy(count: int, values: Floats, to: Floats) -> None:
 
 
 def is_finite(count: int, values: Floats) -> bool:
-    """Whether all are."""
+    """Whether all of so many numbers are finite."""
     total = 0.0
     for k in range(count):
         total += values[k]

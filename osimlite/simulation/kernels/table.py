@@ -75,7 +75,7 @@ LAW_MODULES = {
 EQUILIBRIUM, OFF, RESPONSE = "_equilibrium", "_off", "_response"
 
 LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
-"""Place of a law's address after `layout.LAWS`."""
+"""Index of a law's address among those that begin at `layout.LAWS`."""
 
 
 def law_function(name: str) -> Callable[..., Any]:

@@ -39,13 +39,13 @@ from osimlite.simulation.kernels.wrapping import (
 )
 
 LENGTH = 10_000.0
-"""Of the cylinder, m."""
+"""Length of the cylinder that stands for the torus where the path touches it, m."""
 TOLERANCE, FIRST_RADIUS, EVALUATIONS = 1e-4, 0.2, 500
-"""What lmdif is called with."""
+"""Arguments of MINPACK's lmdif as OpenSim gives them: tolerance, factor of the first trust region, evaluations."""
 WORTHWHILE = 1e-4
 """Part of the expected decrease that a step must bring."""
 STEP = 1e-5
-"""Of the forward differences, m."""
+"""Step of the forward differences in the Jacobian, m."""
 DOWN = (0.0, 0.0, -1.0)
 
 

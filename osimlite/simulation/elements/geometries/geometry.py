@@ -66,4 +66,4 @@ class Geometry:
 
 
 NOTHING = Geometry()
-"""Where a force acts that does nothing."""
+"""The geometry of forces that push on nothing, and have states or outputs alone."""

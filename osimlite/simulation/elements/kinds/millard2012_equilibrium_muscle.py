@@ -29,7 +29,7 @@ from osimlite.simulation.elements.muscle import curve, muscle, require
 from osimlite.simulation.elements.parameters import Fields, Number, positive
 
 LEAST_DAMPING = 0.001
-"""Less counts as none."""
+"""A muscle whose `fiber_damping` is less has none, as in OpenSim."""
 
 
 def _least_activation(force: Any) -> float:
