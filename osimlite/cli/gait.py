@@ -135,7 +135,7 @@ class Nearby:
 
 
 @dataclass
-class Found:
+class GaitReport:
     """What was found out about a walker.
 
     Attributes:
@@ -159,7 +159,7 @@ class Found:
 
 def _walk(
     engine: BatchEngine, state: Sequence[float], feet: Sequence[str] | None, to: float, settle: int, accuracy: float
-) -> tuple[Found, StepMap | None]:
+) -> tuple[GaitReport, StepMap | None]:
     """The walk from a state and the cycle near it, with the step map that has it as a fixed point."""
     from osimlite.errors import OsimliteError
     from osimlite.gait.cycle import find_cycle
@@ -170,7 +170,7 @@ def _walk(
     footing = find_footing(engine, feet)
     (walk,) = walk_many(engine, [state], to, footing=footing, accuracy=WALK_ACCURACY)
     names = [engine.mechanism.coordinate_names[place] for place in engine.order]
-    found = Found(engine.mechanism.name, names, walk)
+    found = GaitReport(engine.mechanism.name, names, walk)
     step_map = None
     try:
         step_map = StepMap(engine, state, footing=footing, accuracy=accuracy)
@@ -180,7 +180,7 @@ def _walk(
     return found, step_map
 
 
-def _told(found: Found, files: Sequence[Path]) -> Facts:
+def _told(found: GaitReport, files: Sequence[Path]) -> Facts:
     from osimlite.simulation.elements import by_class
     from osimlite.text import counted
 
@@ -216,7 +216,7 @@ def _told(found: Found, files: Sequence[Path]) -> Facts:
     return facts
 
 
-def _write(folder: Path, found: Found, pictures: bool) -> list[Path]:
+def _write(folder: Path, found: GaitReport, pictures: bool) -> list[Path]:
     import json
 
     from osimlite.files import write_atomically
@@ -240,7 +240,7 @@ def _write(folder: Path, found: Found, pictures: bool) -> list[Path]:
     return written
 
 
-def _facts(found: Found) -> dict[str, Any]:
+def _facts(found: GaitReport) -> dict[str, Any]:
     """What gait.json says."""
 
     def touches(events: Sequence[Step | Scuff]) -> list[dict[str, Any]]:

@@ -49,7 +49,7 @@ FAMILIES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FindingSink:
     """What a rule calls for each finding of a subject."""
 
     rules: dict[str, Rule]
@@ -106,7 +106,7 @@ class Found:
         )
 
 
-Check = Callable[[Any, Found], None]
+Check = Callable[[Any, FindingSink], None]
 Mends = Literal["", "safe", "unsafe", "both"]
 
 
@@ -296,7 +296,7 @@ def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Repo
         if known not in left_out:
             checks.setdefault(known.check, {})[known.name if known.group else ""] = known
     for check, told_apart in checks.items():
-        check(subject, Found(told_apart, subject, findings))
+        check(subject, FindingSink(told_apart, subject, findings))
     if subject.sure_until is not None:
         limit = subject.sure_until
         findings = [f for f in findings if f.code[4] == "0" or (f.line is not None and f.line < limit)]
@@ -320,7 +320,7 @@ def _not_ignored(
     kept = [finding for finding in findings if not _is_ignored(finding, comments)]
     unused = next(known for known in all_rules() if known.name == "unused-ignore")
     if subject.config.wants(unused):
-        result = Found({"": unused}, subject, kept)
+        result = FindingSink({"": unused}, subject, kept)
         for comment in comments:
             for code in comment.codes:
                 named = [known for known in all_rules() if known.matches(code)]

@@ -8,7 +8,7 @@ from typing import TypedDict
 
 from osimlite.lint.config import Threshold
 from osimlite.lint.diagnostic import Fix
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.inertia import possible_inertia, principal_axes
 from osimlite.lint.placement import on_base
@@ -25,7 +25,7 @@ MASS = Threshold("largest-mass", 1000.0, "kg", "no body of a model is heavier")
 
 
 @rule("OSIM501", "missing-mass", severity=ERROR)
-def missing_mass(subject: Subject, found: Found) -> None:
+def missing_mass(subject: Subject, found: FindingSink) -> None:
     """A body has no mass.
 
     Reports bodies whose mass is not given.
@@ -44,7 +44,7 @@ def missing_mass(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM502", "impossible-inertia", severity=WARNING, thresholds=(SLACK,), mends="unsafe")
-def impossible_inertia(subject: Subject, found: Found) -> None:
+def impossible_inertia(subject: Subject, found: FindingSink) -> None:
     """No distribution of mass has this inertia.
 
     Reports inertias of which one principal moment is larger than the other two together, and by how much.
@@ -74,7 +74,7 @@ def impossible_inertia(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM503", "inertia-not-positive", severity=WARNING, thresholds=(SLACK,), mends="unsafe")
-def inertia_not_positive(subject: Subject, found: Found) -> None:
+def inertia_not_positive(subject: Subject, found: FindingSink) -> None:
     """An inertia has a negative principal moment.
 
     Reports inertias that are negative about some axis: a negative moment, or products that are too large for the
@@ -102,7 +102,7 @@ def inertia_not_positive(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM504", "no-inertia", severity=WARNING)
-def no_inertia(subject: Subject, found: Found) -> None:
+def no_inertia(subject: Subject, found: FindingSink) -> None:
     """A body has mass and no inertia.
 
     Reports bodies with a mass whose inertia is zero or not given.
@@ -144,7 +144,7 @@ def _spins_freely(subject: Subject, body: Body) -> bool:
 
 
 @rule("OSIM523", "mass-out-of-proportion", severity=WARNING, thresholds=(MASS, GYRATION))
-def mass_out_of_proportion(subject: Subject, found: Found) -> None:
+def mass_out_of_proportion(subject: Subject, found: FindingSink) -> None:
     """A mass, or an inertia for its mass, is larger than that of any body.
 
     Reports bodies heavier than a tonne, and inertias that would need the mass to lie several metres from the mass

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from osimlite.document.notes import Note
-from osimlite.lint.engine import ERROR, Found, rule
+from osimlite.lint.engine import ERROR, FindingSink, rule
 from osimlite.lint.fixes import renamed, replaced
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
@@ -18,7 +18,7 @@ from osimlite.text import nearest
 
 
 @rule("OSIM102", "unknown-class", severity=ERROR, mends="both")
-def unknown_class(subject: Subject, found: Found) -> None:
+def unknown_class(subject: Subject, found: FindingSink) -> None:
     """An object is of a class that OpenSim does not have.
 
     Reports elements that should be objects and are of no class of OpenSim 4.6: misspelt, in the wrong case, or of a
@@ -50,7 +50,7 @@ def unknown_class(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM103", "wrong-class", severity=ERROR)
-def wrong_class(subject: Subject, found: Found) -> None:
+def wrong_class(subject: Subject, found: FindingSink) -> None:
     """An object of a known class stands where that class may not stand.
 
     Reports members of a set, or of another property, that are of a class the property does not take.
@@ -80,7 +80,7 @@ def wrong_class(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM108", "wrong-part-name", severity=ERROR, mends="unsafe")
-def wrong_part_name(subject: Subject, found: Found) -> None:
+def wrong_part_name(subject: Subject, found: FindingSink) -> None:
     """A part of an object has a name other than that of its property.
 
     Reports objects such as `<FrameGeometry name="axes">`: a property that holds one object finds it by its name.
@@ -112,7 +112,7 @@ def wrong_part_name(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM109", "missing-wrapper", severity=ERROR)
-def missing_wrapper(subject: Subject, found: Found) -> None:
+def missing_wrapper(subject: Subject, found: FindingSink) -> None:
     """Members of a set do not stand in its `<objects>`.
 
     Reports objects that stand directly in a set or in the object that should list them.

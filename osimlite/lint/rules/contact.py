@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.rules.references import broken_references
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
@@ -17,7 +17,7 @@ from osimlite.schema.tree import Use
 
 
 @rule("OSIM321", "contact-without-partner", severity=WARNING)
-def contact_without_partner(subject: Subject, found: Found) -> None:
+def contact_without_partner(subject: Subject, found: FindingSink) -> None:
     """A contact force has fewer than two surfaces.
 
     Reports contact forces that list no contact geometry, or only one, over all their parameter sets together.
@@ -43,7 +43,7 @@ def contact_without_partner(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM322", "contact-listed-twice", severity=ERROR)
-def contact_listed_twice(subject: Subject, found: Found) -> None:
+def contact_listed_twice(subject: Subject, found: FindingSink) -> None:
     """A contact force lists the same surface twice.
 
     Reports every mention of a contact geometry after the first within one force.
@@ -78,7 +78,7 @@ def contact_listed_twice(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM323", "unused-contact-geometry", severity=INFO)
-def unused_contact_geometry(subject: Subject, found: Found) -> None:
+def unused_contact_geometry(subject: Subject, found: FindingSink) -> None:
     """A contact geometry is used by nothing.
 
     Reports contact geometry that no force and no path names.

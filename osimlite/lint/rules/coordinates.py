@@ -6,7 +6,7 @@ import math
 
 from osimlite.document.lexical import shortest
 from osimlite.lint.config import Threshold
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
@@ -19,7 +19,7 @@ ORIENTATION = Threshold("largest-orientation", 2 * math.pi, "rad", "a larger ang
 
 
 @rule("OSIM511", "inverted-range", severity=WARNING, mends="unsafe")
-def inverted_range(subject: Subject, found: Found) -> None:
+def inverted_range(subject: Subject, found: FindingSink) -> None:
     """The range of a coordinate ends before it begins.
 
     Reports ranges whose first number is larger than the second; an error if the coordinate is clamped.
@@ -51,7 +51,7 @@ def inverted_range(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM512", "default-outside-range", severity=WARNING)
-def default_outside_range(subject: Subject, found: Found) -> None:
+def default_outside_range(subject: Subject, found: FindingSink) -> None:
     """The default value of a coordinate lies outside its range.
 
     Reports such defaults; an error if the coordinate is clamped.
@@ -81,7 +81,7 @@ def default_outside_range(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM513", "prescribed-without-function", severity=ERROR)
-def prescribed_without_function(subject: Subject, found: Found) -> None:
+def prescribed_without_function(subject: Subject, found: FindingSink) -> None:
     """A coordinate is prescribed and has no function.
 
     Reports coordinates with `<prescribed>true</prescribed>` and no `<prescribed_function>`.
@@ -105,7 +105,7 @@ def prescribed_without_function(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM514", "degrees-for-radians", severity=WARNING, thresholds=(ANGLE, UNBOUNDED, ORIENTATION))
-def degrees_for_radians(subject: Subject, found: Found) -> None:
+def degrees_for_radians(subject: Subject, found: FindingSink) -> None:
     """An angle looks as if it were in degrees.
 
     Reports rotational coordinates whose default value or range goes beyond five turns, in radians, and frames,

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, cast
 
 from osimlite.lint.axes import axes_of, axes_refused, coordinates_of, names_on
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Unknown
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @rule("OSIM410", "made-up-coordinate", severity=ERROR)
-def made_up_coordinate(subject: Subject, found: Found) -> None:
+def made_up_coordinate(subject: Subject, found: FindingSink) -> None:
     """An axis of a custom joint names a coordinate that the joint does not declare.
 
     Reports such names where OpenSim takes the model all the same; where it refuses the model, the name is reported as
@@ -70,7 +70,7 @@ def made_up_coordinate(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM412", "axis-without-coordinate", severity=ERROR)
-def axis_without_coordinate(subject: Subject, found: Found) -> None:
+def axis_without_coordinate(subject: Subject, found: FindingSink) -> None:
     """An axis of a custom joint has a function and no coordinate for it.
 
     Reports axes that name no coordinate though their function wants a variable. Constant and linear functions do
@@ -100,7 +100,7 @@ def axis_without_coordinate(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM413", "collinear-axes", severity=ERROR)
-def collinear_axes(subject: Subject, found: Found) -> None:
+def collinear_axes(subject: Subject, found: FindingSink) -> None:
     """Two rotations, or two translations, of a custom joint have the same axis.
 
     Reports axes of a custom joint that are parallel to one before of the same kind, or have no length.
@@ -132,7 +132,7 @@ def collinear_axes(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM414", "idle-coordinate", severity=ERROR)
-def idle_coordinate(subject: Subject, found: Found) -> None:
+def idle_coordinate(subject: Subject, found: FindingSink) -> None:
     """A coordinate of a custom joint moves nothing.
 
     Reports coordinates that no axis uses, or only with a function that does not change with them in the default pose: a

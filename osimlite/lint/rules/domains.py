@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from osimlite.lint.consequences import consequence
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject, once
 from osimlite.lint.words import quantity, shown
 from osimlite.schema.base import Object
@@ -20,7 +20,7 @@ from osimlite.text import listed, nearest
 
 
 @rule("OSIM205", "not-finite", severity=ERROR)
-def not_finite(subject: Subject, found: Found) -> None:
+def not_finite(subject: Subject, found: FindingSink) -> None:
     """A number is NaN, or infinite where that makes no sense.
 
     Reports NaN in any number, and infinity except in bounds (ranges, smallest and largest controls), where it is
@@ -57,7 +57,7 @@ def not_finite(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM206", "impossible-value", severity=ERROR)
-def impossible_value(subject: Subject, found: Found) -> None:
+def impossible_value(subject: Subject, found: FindingSink) -> None:
     """A number makes OpenSim fail or compute NaN.
 
     Reports values outside their domain of which it is known that OpenSim refuses them, or computes nonsense: contact
@@ -79,7 +79,7 @@ def impossible_value(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM207", "doubtful-value", severity=WARNING)
-def doubtful_value(subject: Subject, found: Found) -> None:
+def doubtful_value(subject: Subject, found: FindingSink) -> None:
     """A number is outside the values that make sense for its property.
 
     Reports numbers outside the domain that the property declares: a negative radius or dissipation, an opacity of 3;
@@ -106,7 +106,7 @@ def doubtful_value(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM208", "unknown-choice", severity=ERROR)
-def unknown_choice(subject: Subject, found: Found) -> None:
+def unknown_choice(subject: Subject, found: FindingSink) -> None:
     """A property has a value other than those that mean something.
 
     Reports words and numbers outside the list of those that OpenSim knows for a property.
@@ -202,7 +202,9 @@ def _is_missing(item: Object, spec: FieldSpec, value: Any) -> bool:
     return spec.tag != "mass" and spec.name not in item.model_fields_set and _has_nan(value)
 
 
-def _report_domain(subject: Subject, found: Found, item: Object, spec: FieldSpec, value: Any, verdict: Verdict) -> None:
+def _report_domain(
+    subject: Subject, found: FindingSink, item: Object, spec: FieldSpec, value: Any, verdict: Verdict
+) -> None:
     given = spec.name in item.model_fields_set
     assert isinstance(spec.kind, Value)
     if verdict.number != verdict.number:

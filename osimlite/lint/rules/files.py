@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from osimlite.document.source import Source
 from osimlite.files import NAMED_SO
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
@@ -17,7 +17,7 @@ from osimlite.text import counted, listed
 
 
 @rule("OSIM701", "missing-mesh", severity=WARNING)
-def missing_mesh(subject: Subject, found: Found) -> None:
+def missing_mesh(subject: Subject, found: FindingSink) -> None:
     """A mesh file is not there.
 
     Looks for the file of each mesh where OpenSim does: beside the model, in the folder `Geometry` beside it, and in
@@ -61,7 +61,7 @@ def missing_mesh(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM702", "included-file", severity=INFO)
-def included_file(subject: Subject, found: Found) -> None:
+def included_file(subject: Subject, found: FindingSink) -> None:
     """An object is kept in another file.
 
     Reports `file=` on an object: for information, as a warning if that file is not there or does not hold it, is no
@@ -125,7 +125,7 @@ def _has_content(source: Source | None, number: int) -> bool:
 
 
 @rule("OSIM703", "missing-data-file", severity=ERROR)
-def missing_data_file(subject: Subject, found: Found) -> None:
+def missing_data_file(subject: Subject, found: FindingSink) -> None:
     """A file of measured loads, of controls or of a table is not there.
 
     Looks for the files of external loads, of controllers and of table sources beside the model and in the folder that

@@ -7,7 +7,7 @@ from math import comb
 from typing import Final, cast
 
 from osimlite.lint.axes import axes_of
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.base import Object
@@ -28,7 +28,7 @@ Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstant
 
 
 @rule("OSIM601", "unsorted-abscissae", severity=ERROR)
-def unsorted_abscissae(subject: Subject, found: Found) -> None:
+def unsorted_abscissae(subject: Subject, found: FindingSink) -> None:
     """The x values of a function do not rise.
 
     Reports the first x that is smaller than the one before it, and of splines also the first that is equal to it.
@@ -72,7 +72,7 @@ def unsorted_abscissae(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM602", "unequal-points", severity=ERROR)
-def unequal_points(subject: Subject, found: Found) -> None:
+def unequal_points(subject: Subject, found: FindingSink) -> None:
     """A function has not as many y values as x values.
 
     Reports tabulated functions whose lists are of different length. Too many y are a warning.
@@ -103,7 +103,7 @@ def unequal_points(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM603", "too-few-points", severity=ERROR)
-def too_few_points(subject: Subject, found: Found) -> None:
+def too_few_points(subject: Subject, found: FindingSink) -> None:
     """A function has too few points.
 
     Reports a SimmSpline of fewer than two points, a GCVSpline of fewer than twice its half order, and piecewise
@@ -131,7 +131,7 @@ def too_few_points(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM604", "coefficient-count", severity=WARNING)
-def coefficient_count(subject: Subject, found: Found) -> None:
+def coefficient_count(subject: Subject, found: FindingSink) -> None:
     """A linear function or a polynomial has too many or too few coefficients.
 
     Reports linear functions without coefficients (an error), polynomials of several variables with another number than
@@ -193,7 +193,7 @@ _NEEDED: Final = {
 
 
 @rule("OSIM605", "missing-function", severity=ERROR)
-def missing_function(subject: Subject, found: Found) -> None:
+def missing_function(subject: Subject, found: FindingSink) -> None:
     """A function is not there that OpenSim cannot do without.
 
     Reports MultiplierFunctions, CoordinateCouplerConstraints and FunctionBasedPaths without a function inside, and

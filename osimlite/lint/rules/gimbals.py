@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.lint.axes import coordinates_of
-from osimlite.lint.engine import WARNING, Found, rule
+from osimlite.lint.engine import WARNING, FindingSink, rule
 from osimlite.lint.placement import dot, turning_axes
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
@@ -14,7 +14,7 @@ _LOCKED = 1e-8
 
 
 @rule("OSIM416", "gimbal-lock", severity=WARNING)
-def gimbal_lock(subject: Subject, found: Found) -> None:
+def gimbal_lock(subject: Subject, found: FindingSink) -> None:
     """Two of the three rotations of a joint are about one axis in the default pose.
 
     Reports GimbalJoints, and CustomJoints with three rotations, whose second rotation has by default a right angle that

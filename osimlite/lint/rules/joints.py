@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.lint.axes import axes_refused, coordinates_of, names_on_axes
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.skeleton import base_of, skeleton
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
@@ -14,7 +14,7 @@ from osimlite.text import counted, listed
 
 
 @rule("OSIM402", "joint-to-itself", severity=ERROR)
-def joint_to_itself(subject: Subject, found: Found) -> None:
+def joint_to_itself(subject: Subject, found: FindingSink) -> None:
     """A joint connects a body to itself.
 
     Reports joints whose two frames are the same or are fixed to the same body.
@@ -41,7 +41,7 @@ def joint_to_itself(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM405", "wrong-coordinate-count", severity=ERROR)
-def wrong_coordinate_count(subject: Subject, found: Found) -> None:
+def wrong_coordinate_count(subject: Subject, found: FindingSink) -> None:
     """A joint has not as many coordinates as it needs.
 
     Reports joints with more or fewer coordinates than their class moves by, custom joints with a coordinate that none
@@ -102,7 +102,7 @@ def _says_none(subject: Subject, joint: Joint) -> bool:
 
 
 @rule("OSIM406", "shared-coordinate-name", severity=ERROR)
-def shared_coordinate_name(subject: Subject, found: Found) -> None:
+def shared_coordinate_name(subject: Subject, found: FindingSink) -> None:
     """Two joints have a coordinate of the same name.
 
     Reports the second coordinate of a name, with the forces and others that look the name up. Without any it is a
@@ -137,7 +137,7 @@ def shared_coordinate_name(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM408", "ground-as-child", severity=INFO)
-def ground_as_child(subject: Subject, found: Found) -> None:
+def ground_as_child(subject: Subject, found: FindingSink) -> None:
     """A joint has ground as its child.
 
     Reports joints whose child frame is fixed to ground.
@@ -169,7 +169,7 @@ def ground_as_child(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM409", "stray-joint-frame", severity=WARNING)
-def stray_joint_frame(subject: Subject, found: Found) -> None:
+def stray_joint_frame(subject: Subject, found: FindingSink) -> None:
     """A joint holds a frame that has nothing to do with it.
 
     Reports frames in the `<frames>` of a joint that are fixed to neither of the bodies it connects. It is an error if

@@ -9,7 +9,7 @@ from math import isfinite
 from osimlite.document.lexical import ABSENT, Unclean, converter
 from osimlite.document.names import ATTRIBUTE
 from osimlite.document.source import Source
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import without_attribute, without_element, without_text
 from osimlite.lint.rules.markup import REMARKS
 from osimlite.lint.subject import Subject
@@ -22,7 +22,7 @@ from osimlite.text import nearest
 
 
 @rule("OSIM105", "unknown-attribute", severity=ERROR, mends="safe")
-def unknown_attribute(subject: Subject, found: Found) -> None:
+def unknown_attribute(subject: Subject, found: FindingSink) -> None:
     """An element has an attribute that means nothing.
 
     Reports attributes of objects other than `name` and `file`; a warning on an element that is no object. Attributes of
@@ -82,7 +82,7 @@ def _beside_objects(subject: Subject) -> Iterator[tuple[int, str, str]]:
 
 
 @rule("OSIM106", "stray-text", severity=WARNING, mends="safe")
-def stray_text(subject: Subject, found: Found) -> None:
+def stray_text(subject: Subject, found: FindingSink) -> None:
     """There is text between elements.
 
     Reports text that stands beside elements, where only elements have a meaning.
@@ -117,7 +117,7 @@ def stray_text(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM110", "defaults", severity=WARNING, mends="safe")
-def defaults_block(subject: Subject, found: Found) -> None:
+def defaults_block(subject: Subject, found: FindingSink) -> None:
     """The file has a `<defaults>` block.
 
     Reports `<defaults>`: a warning if there is something in it, else for information. What OpenSim cannot read in the
@@ -154,7 +154,7 @@ def defaults_block(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM111", "force-outside-set", severity=INFO)
-def force_outside_set(subject: Subject, found: Found) -> None:
+def force_outside_set(subject: Subject, found: FindingSink) -> None:
     """Forces stand elsewhere than in the ForceSet.
 
     Reports forces, actuators and muscles among the `<components>` of the model or of another part of it, or in its
@@ -187,7 +187,7 @@ def force_outside_set(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM112", "not-upgradable", severity=ERROR)
-def not_upgradable(subject: Subject, found: Found) -> None:
+def not_upgradable(subject: Subject, found: FindingSink) -> None:
     """OpenSim cannot bring an old document up to date.
 
     Reports what OpenSim needs while it changes a document of an older version into the current format, and finds

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import hypot
 
 from osimlite.document.source import Position
-from osimlite.lint.engine import INFO, WARNING, Found, rule
+from osimlite.lint.engine import INFO, WARNING, FindingSink, rule
 from osimlite.lint.table import Table
 from osimlite.tables import METRES
 
@@ -14,7 +14,7 @@ _LARGEST, _SMALLEST = 8.0, 0.02
 
 
 @rule("OSIM811", "marker-units", severity=WARNING, mends="unsafe", about="table")
-def marker_units(table: Table, found: Found) -> None:
+def marker_units(table: Table, found: FindingSink) -> None:
     """The units of a marker file do not fit its numbers.
 
     Looks how far the markers of a frame are spread: more than 8 m or less than 2 cm is no moving body.
@@ -58,7 +58,7 @@ def _spread(sample: list[float]) -> float | None:
 
 
 @rule("OSIM812", "marker-gap", severity=WARNING, about="table")
-def marker_gap(table: Table, found: Found) -> None:
+def marker_gap(table: Table, found: FindingSink) -> None:
     """A marker is at the origin, or only a part of it is there.
 
     Finds markers at 0 0 0, where programs put what they did not see, markers of which one or two cells are empty, and
@@ -89,7 +89,7 @@ def marker_gap(table: Table, found: Found) -> None:
 
 
 @rule("OSIM813", "frame-number", severity=INFO, about="table")
-def frame_number(table: Table, found: Found) -> None:
+def frame_number(table: Table, found: FindingSink) -> None:
     """The frames of a marker file are not numbered one after the other.
 
     Compares the number of each frame with that of the frame before.

@@ -6,7 +6,7 @@ import re
 
 from osimlite.document.source import Source
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced, without_text
 from osimlite.lint.subject import Subject
 
@@ -20,7 +20,7 @@ _NUMBERED = re.compile(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
 
 
 @rule("OSIM008", "character-reference", severity=ERROR, mends="safe")
-def character_reference(subject: Subject, found: Found) -> None:
+def character_reference(subject: Subject, found: FindingSink) -> None:
     """A numeric character reference stands for a character beyond ASCII.
 
     Reports references such as `&#233;` with a number above 127.
@@ -49,7 +49,7 @@ def character_reference(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM009", "lenient-xml", severity=WARNING, mends="safe")
-def lenient_xml(subject: Subject, found: Found) -> None:
+def lenient_xml(subject: Subject, found: FindingSink) -> None:
     """The text is not XML in a way that OpenSim overlooks.
 
     Reports a bare `&`, `]]>`, two hyphens inside a comment, characters that XML does not have, values of attributes
@@ -131,7 +131,7 @@ def _control(source: Source, start: int) -> int:
 
 
 @rule("OSIM011", "text-outside-root", severity=ERROR, mends="safe")
-def text_outside_root(subject: Subject, found: Found) -> None:
+def text_outside_root(subject: Subject, found: FindingSink) -> None:
     """There is text before or after the root element.
 
     Reports text that stands outside `<OpenSimDocument>`, be it a remark that is no comment, what an editor left behind,
@@ -165,7 +165,7 @@ def text_outside_root(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM012", "byte-order-mark", severity=INFO)
-def byte_order_mark(subject: Subject, found: Found) -> None:
+def byte_order_mark(subject: Subject, found: FindingSink) -> None:
     """The file has a byte-order mark.
 
     Reports the bytes EF BB BF at the beginning of a file, which some Windows editors write, and the same mark between
@@ -187,7 +187,7 @@ def byte_order_mark(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM013", "closing-tag", severity=ERROR, mends="safe")
-def closing_tag(subject: Subject, found: Found) -> None:
+def closing_tag(subject: Subject, found: FindingSink) -> None:
     """There is white space in a closing tag.
 
     Reports closing tags such as `</mass >`, and those that are broken over two lines.

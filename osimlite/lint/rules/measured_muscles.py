@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.lint.config import Threshold
-from osimlite.lint.engine import INFO, WARNING, Found, rule
+from osimlite.lint.engine import INFO, WARNING, FindingSink, rule
 from osimlite.lint.measures import MEASURES, measures_of
 from osimlite.lint.rules.muscles import LONGEST
 from osimlite.lint.subject import Subject
@@ -15,7 +15,7 @@ OFF = Threshold(
 
 
 @rule("OSIM635", "start-off-equilibrium", severity=INFO, thresholds=(OFF,), about=MEASURES)
-def start_off_equilibrium(subject: Subject, found: Found) -> None:
+def start_off_equilibrium(subject: Subject, found: FindingSink) -> None:
     """A muscle starts far from equilibrium.
 
     Reports muscles with an elastic tendon whose fibers, in the default pose and at their default activation, start more
@@ -57,7 +57,7 @@ def start_off_equilibrium(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM636", "fiber-limit", severity=INFO, thresholds=(LONGEST,), about=MEASURES)
-def fiber_limit(subject: Subject, found: Found) -> None:
+def fiber_limit(subject: Subject, found: FindingSink) -> None:
     """The fibers of a muscle reach a limit within the ranges of the coordinates.
 
     Reports muscles whose fibers in equilibrium, fully active, are as short as pennation (`maximum_pennation_angle`) or

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.lint.config import Threshold
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.measures import MEASURES, MovingPoint, measures_of
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
@@ -16,7 +16,7 @@ OFF = Threshold("wrapping-error", 0.001, "m", "so far may OpenSim's length of a 
 
 
 @rule("OSIM631", "wrong-wrapping", severity=WARNING, thresholds=(OFF,), about=MEASURES)
-def wrong_wrapping(subject: Subject, found: Found) -> None:
+def wrong_wrapping(subject: Subject, found: FindingSink) -> None:
     """OpenSim computes a path around surfaces wrongly.
 
     Reports paths whose length in OpenSim is a millimetre or more off that along geodesics, the shortest ways on the
@@ -71,7 +71,7 @@ JUMP = Threshold("path-jump", 0.001, "m", "so far may a path jump; less than 0.0
 
 
 @rule("OSIM632", "path-jump", severity=WARNING, thresholds=(JUMP,), about=MEASURES)
-def path_jump(subject: Subject, found: Found) -> None:
+def path_jump(subject: Subject, found: FindingSink) -> None:
     """The length of a path jumps.
 
     Reports paths whose length jumps by a millimetre or more where a coordinate takes a value within its range, the
@@ -103,7 +103,7 @@ def path_jump(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM633", "length-of-wrap", severity=ERROR, about=MEASURES)
-def length_of_wrap(subject: Subject, found: Found) -> None:
+def length_of_wrap(subject: Subject, found: FindingSink) -> None:
     """OpenSim computes a negative length of a path on a surface, or none.
 
     Reports wraps of which OpenSim subtracts the length of the path on the surface instead of adding it, which happens
@@ -139,7 +139,7 @@ RATE = Threshold("resting-point", 0.005, "m per rad or m", "a point that rests o
 
 
 @rule("OSIM634", "moving-point-range", severity=WARNING, thresholds=(MADE_UP, RATE), about=MEASURES)
-def moving_point_range(subject: Subject, found: Found) -> None:
+def moving_point_range(subject: Subject, found: FindingSink) -> None:
     """A moving path point has no place for all values of its coordinate.
 
     Reports moving points whose functions end before the range of their coordinate does, and make the point move on by a

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import chain
 from typing import Any
 
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.posture import angles_of, coordinate_of
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
@@ -24,7 +24,7 @@ _ALLOW = ("allow_unused_references", "kinematics_allow_extra_columns")
 
 
 @rule("OSIM861", "impossible-bounds", severity=ERROR, about="document")
-def impossible_bounds(setup: Setup, found: Found) -> None:
+def impossible_bounds(setup: Setup, found: FindingSink) -> None:
     """Bounds of a study leave no value.
 
     Compares both ends of all bounds, bounds at the start and at the end with those of the whole phase, and the times at
@@ -95,7 +95,7 @@ _COUNTED = ("states", "controls", "multipliers", "derivatives", "slacks", "param
 
 
 @rule("OSIM862", "study-data", severity=ERROR, about="document")
-def study_data(setup: Setup, found: Found) -> None:
+def study_data(setup: Setup, found: FindingSink) -> None:
     """A table that a study follows, or starts from, does not fit its model.
 
     Looks for tables that are not named, for motions that do not say whether they are in degrees, for times that a table
@@ -197,7 +197,7 @@ def _strangers(setup: Setup, reference: Reference, held: Any, table: Table) -> l
 
 
 @rule("OSIM863", "study-parts", severity=ERROR, about="document")
-def study_parts(setup: Setup, found: Found) -> None:
+def study_parts(setup: Setup, found: FindingSink) -> None:
     """A part of a study has a name or a target that OpenSim refuses.
 
     Looks for goals, constraints and parameters without a name or with that of another, for parameters of properties

@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 
 from osimlite.lint.config import Threshold
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.placement import Vector, default_poses, on_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
@@ -19,7 +19,7 @@ LONGEST = Threshold("longest-fiber", 2.0, "of the optimal length", "no fiber sta
 
 
 @rule("OSIM621", "doubtful-muscle", severity=WARNING, thresholds=(PENNATION, SHORTEST, LONGEST))
-def doubtful_muscle(subject: Subject, found: Found) -> None:
+def doubtful_muscle(subject: Subject, found: FindingSink) -> None:
     """The fibers of a muscle have an implausible length or angle.
 
     Reports a pennation angle of a quarter turn or more, and a default fiber length, given in the file, that is less
@@ -62,7 +62,7 @@ def doubtful_muscle(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM622", "control-below-activation", severity=ERROR)
-def control_below_activation(subject: Subject, found: Found) -> None:
+def control_below_activation(subject: Subject, found: FindingSink) -> None:
     """The least control of a muscle is below its least activation.
 
     Reports Thelen and Millard muscles whose `min_control` is smaller than their `minimum_activation`.
@@ -88,7 +88,7 @@ def control_below_activation(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM623", "out-of-reach", severity=WARNING, thresholds=(LONGEST,))
-def out_of_reach(subject: Subject, found: Found) -> None:
+def out_of_reach(subject: Subject, found: FindingSink) -> None:
     """The path of a muscle leaves its fibers no length that they could have.
 
     Reports muscles whose path, in the default pose, is shorter than the slack tendon, or longer than it by more than 2
@@ -125,7 +125,7 @@ def out_of_reach(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM624", "shared-time-constants", severity=WARNING)
-def shared_time_constants(subject: Subject, found: Found) -> None:
+def shared_time_constants(subject: Subject, found: FindingSink) -> None:
     """Muscles differ in time constants that OpenSim has only once.
 
     Reports each DeGrooteFregly2016Muscle whose `activation_time_constant`, `deactivation_time_constant` or

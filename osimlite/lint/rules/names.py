@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.rules.references import Broken, broken_references
 from osimlite.lint.subject import Subject, once
 from osimlite.lint.words import called
@@ -19,7 +19,7 @@ _ILLEGAL = frozenset(ILLEGAL_CHARACTERS)
 
 
 @rule("OSIM311", "duplicate-name", severity=ERROR)
-def duplicate_name(subject: Subject, found: Found) -> None:
+def duplicate_name(subject: Subject, found: FindingSink) -> None:
     """Two components beside each other have the same name.
 
     Reports the second of two siblings with one name, with the name OpenSim gives it and with those who name it.
@@ -51,7 +51,7 @@ def duplicate_name(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM312", "illegal-name", severity=ERROR, before=(30500, WARNING))
-def illegal_name(subject: Subject, found: Found) -> None:
+def illegal_name(subject: Subject, found: FindingSink) -> None:
     """The name of a component has a character that names cannot have.
 
     Reports white space, `/`, `\\`, `*` and `+` in the names of components.
@@ -103,7 +103,7 @@ def illegal_name(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM313", "missing-name", severity=WARNING)
-def missing_name(subject: Subject, found: Found) -> None:
+def missing_name(subject: Subject, found: FindingSink) -> None:
     """A component that others name by its name has none.
 
     Reports members of sets, and coordinates, without a name or with an empty one. It is an error if something names a

@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 
 from osimlite.lint.config import Threshold
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.base import Object
@@ -16,7 +16,7 @@ from osimlite.text import counted
 
 
 @rule("OSIM611", "short-path", severity=ERROR)
-def short_path(subject: Subject, found: Found) -> None:
+def short_path(subject: Subject, found: FindingSink) -> None:
     """A path has fewer than two points.
 
     Reports geometry paths with no point, or with one, muscles and springs without a path, and a
@@ -63,7 +63,7 @@ DISTANCE = Threshold("path-point-distance", 0.0, "m", "points of a path this nea
 
 
 @rule("OSIM612", "coincident-path-points", severity=WARNING, thresholds=(DISTANCE,))
-def coincident_path_points(subject: Subject, found: Found) -> None:
+def coincident_path_points(subject: Subject, found: FindingSink) -> None:
     """Two points of a path that follow each other are in the same place.
 
     Reports a point fixed at the same place of the same frame as the point before it.
@@ -100,7 +100,7 @@ def coincident_path_points(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM613", "inverted-point-range", severity=WARNING)
-def inverted_point_range(subject: Subject, found: Found) -> None:
+def inverted_point_range(subject: Subject, found: FindingSink) -> None:
     """A conditional path point is never in the path.
 
     Reports conditional points whose range ends before it begins, and those without any.
@@ -128,7 +128,7 @@ def inverted_point_range(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM614", "unused-wrap-object", severity=INFO)
-def unused_wrap_object(subject: Subject, found: Found) -> None:
+def unused_wrap_object(subject: Subject, found: FindingSink) -> None:
     """No path wraps around a wrap surface.
 
     Reports wrap objects that no path names.
@@ -153,7 +153,7 @@ def unused_wrap_object(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM615", "moving-point-coordinates", severity=ERROR)
-def moving_point_coordinates(subject: Subject, found: Found) -> None:
+def moving_point_coordinates(subject: Subject, found: FindingSink) -> None:
     """The location of a moving path point depends on more than one coordinate.
 
     Reports moving path points whose x, y and z follow different coordinates.

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from osimlite.lint.config import Threshold
-from osimlite.lint.engine import INFO, WARNING, Found, rule
+from osimlite.lint.engine import INFO, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.coordinates import Coordinate
@@ -22,7 +22,7 @@ UNLIMITED = Threshold("unlimited-range", 4 * math.pi, "rad", "a wider range stan
 
 
 @rule("OSIM505", "strange-gravity", severity=WARNING, thresholds=(GRAVITY,))
-def strange_gravity(subject: Subject, found: Found) -> None:
+def strange_gravity(subject: Subject, found: FindingSink) -> None:
     """Gravity is far from that of the Earth.
 
     Reports gravity stronger than 30 m/s^2, which is usually one in millimetres, and gravity that points up along Y.
@@ -48,7 +48,7 @@ def strange_gravity(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM506", "friction-order", severity=WARNING)
-def friction_order(subject: Subject, found: Found) -> None:
+def friction_order(subject: Subject, found: FindingSink) -> None:
     """Static friction is smaller than dynamic friction.
 
     Reports contact materials whose static coefficient is below the dynamic one.
@@ -81,7 +81,7 @@ def friction_order(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM507", "limits-swapped", severity=WARNING)
-def limits_swapped(subject: Subject, found: Found) -> None:
+def limits_swapped(subject: Subject, found: FindingSink) -> None:
     """The upper limit of a limit force lies below its lower limit.
 
     Reports limit forces whose upper limit is smaller than the lower one.
@@ -106,7 +106,7 @@ def limits_swapped(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM508", "limit-outside-range", severity=INFO, thresholds=(BEYOND,))
-def limit_outside_range(subject: Subject, found: Found) -> None:
+def limit_outside_range(subject: Subject, found: FindingSink) -> None:
     """A limit force begins beyond the range of its coordinate.
 
     Reports limits that lie outside the range of the coordinate by more than the transition.
@@ -138,7 +138,7 @@ def limit_outside_range(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM509", "limit-inside-range", severity=INFO, thresholds=(INSIDE, UNLIMITED))
-def limit_inside_range(subject: Subject, found: Found) -> None:
+def limit_inside_range(subject: Subject, found: FindingSink) -> None:
     """A limit force begins well inside the range of its coordinate.
 
     Reports limits inside the range of the coordinate by more than the transition and a quarter of the range. It is a

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 from osimlite.lint.axes import axes_refused, made_up_paths
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject, once
 from osimlite.lint.words import a, called, closest, nearest_name
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @rule("OSIM301", "unresolved-reference", severity=ERROR, mends="both")
-def unresolved_reference(subject: Subject, found: Found) -> None:
+def unresolved_reference(subject: Subject, found: FindingSink) -> None:
     """A component names another component that does not exist.
 
     Follows every reference by OpenSim's own rule for that property and reports those that lead nowhere, with the force,
@@ -51,7 +51,7 @@ def unresolved_reference(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM302", "reference-to-wrong-type", severity=ERROR, mends="unsafe")
-def reference_to_wrong_type(subject: Subject, found: Found) -> None:
+def reference_to_wrong_type(subject: Subject, found: FindingSink) -> None:
     """A reference leads to a component of a class that the property cannot use.
 
     Reports references to something that exists and is of another kind: a joint as the parent frame, a body where a
@@ -78,7 +78,7 @@ def reference_to_wrong_type(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM303", "missing-reference", severity=ERROR)
-def missing_reference(subject: Subject, found: Found) -> None:
+def missing_reference(subject: Subject, found: FindingSink) -> None:
     """A property that must name a component names none.
 
     Reports sockets and names that are empty or not given.
@@ -112,7 +112,7 @@ def missing_reference(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM304", "reference-form", severity=ERROR, mends="both")
-def reference_form(subject: Subject, found: Found) -> None:
+def reference_form(subject: Subject, found: FindingSink) -> None:
     """A component is named by its path where a bare name belongs, or by its name where a path belongs.
 
     Reports references that would be right in another form: a bare name in a socket, a path without its leading slash,
@@ -147,7 +147,7 @@ def reference_form(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM305", "reference-case", severity=ERROR, mends="safe")
-def reference_case(subject: Subject, found: Found) -> None:
+def reference_case(subject: Subject, found: FindingSink) -> None:
     """A reference is right but for upper and lower case.
 
     Reports references that lead to a component once case is ignored.
@@ -358,7 +358,7 @@ def _contacts_on(subject: Subject, frame: Object) -> list[str]:
     ]
 
 
-def _report(subject: Subject, found: Found, broken: Broken, message: str) -> None:
+def _report(subject: Subject, found: FindingSink, broken: Broken, message: str) -> None:
     use = broken.use
     value = getattr(use.holder, use.spec.name)
     before = value[: use.position] if isinstance(value, tuple) and use.position else ()

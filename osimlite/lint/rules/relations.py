@@ -14,7 +14,7 @@ from osimlite.forces.muscle_curves import (
     force_velocity,
     tendon_force_length,
 )
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.rules.domains import outside
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
@@ -39,7 +39,7 @@ from osimlite.text import counted
 
 
 @rule("OSIM209", "contradicting-values", severity=ERROR)
-def contradicting_values(subject: Subject, found: Found) -> None:
+def contradicting_values(subject: Subject, found: FindingSink) -> None:
     """Numbers of one object contradict each other.
 
     Reports curves of muscles whose numbers make no curve, what a class of muscles does not have or cannot compute with
@@ -69,7 +69,7 @@ def contradicting_values(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM510", "controls-swapped", severity=WARNING)
-def controls_swapped(subject: Subject, found: Found) -> None:
+def controls_swapped(subject: Subject, found: FindingSink) -> None:
     """The least control of an actuator is above its largest.
 
     Reports actuators and muscles whose `min_control` is larger than their `max_control`.

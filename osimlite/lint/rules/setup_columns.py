@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup, content_of, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import meant, nearest_name
@@ -15,7 +15,7 @@ from osimlite.text import listed
 
 
 @rule("OSIM842", "missing-column", severity=WARNING, about="document")
-def missing_column(setup: Setup, found: Found) -> None:
+def missing_column(setup: Setup, found: FindingSink) -> None:
     """A table of coordinates lacks coordinates of the model, or has none of them.
 
     Compares the columns of a table of coordinates with the coordinates of the model: inverse dynamics takes plain names

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.setup import UNGIVEN, Naming, Setup, content_of, is_given, motion_of
 from osimlite.lint.suffixes import is_table
 from osimlite.lint.words import called
@@ -23,7 +23,7 @@ _SHARED = {
 
 
 @rule("OSIM821", "missing-input", severity=ERROR, mends="safe", about="document")
-def missing_input(setup: Setup, found: Found) -> None:
+def missing_input(setup: Setup, found: FindingSink) -> None:
     """A file that a setup reads is not there, or is not named.
 
     Looks for every file that a setup reads where OpenSim does: beside the setup, if OpenSim is started there. What
@@ -93,7 +93,7 @@ def _in_other_case(naming: Naming) -> str | None:
 
 
 @rule("OSIM822", "input-of-another-kind", severity=ERROR, about="document")
-def input_of_another_kind(setup: Setup, found: Found) -> None:
+def input_of_another_kind(setup: Setup, found: FindingSink) -> None:
     """A file that a setup reads holds something else than is needed.
 
     Compares the ending of a table, and the class at the top of a document, with what the property needs: a set of
@@ -132,7 +132,7 @@ def input_of_another_kind(setup: Setup, found: Found) -> None:
 
 
 @rule("OSIM823", "lost-output", severity=WARNING, mends="both", about="document")
-def lost_output(setup: Setup, found: Found) -> None:
+def lost_output(setup: Setup, found: FindingSink) -> None:
     """Results would be lost, or land in another place.
 
     Looks at the folder for results, of which OpenSim makes the last part only, at folders of output files that are not
@@ -193,7 +193,7 @@ def lost_output(setup: Setup, found: Found) -> None:
 
 
 @rule("OSIM824", "tools-differ", severity=INFO, about="document")
-def tools_differ(setup: Setup, found: Found) -> None:
+def tools_differ(setup: Setup, found: FindingSink) -> None:
     """A tool leaves out what another tool takes into account for the same motion.
 
     Compares a tool with all others in its folder that are given the same file of coordinates: whether they have

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence, Set
 
-from osimlite.lint.engine import WARNING, Found, rule
+from osimlite.lint.engine import WARNING, FindingSink, rule
 from osimlite.lint.posture import marker_places
 from osimlite.lint.rules.setup_markers import cells_of, marker_users, rows_between
 from osimlite.lint.setup import Setup, members
@@ -20,7 +20,7 @@ _SIDES = (("R", "L"), ("r", "l"), ("Right", "Left"), ("right", "left"), ("RIGHT"
 
 
 @rule("OSIM855", "scale-factor", severity=WARNING, about="document")
-def scale_factor(setup: Setup, found: Found) -> None:
+def scale_factor(setup: Setup, found: FindingSink) -> None:
     """A body would be scaled by an implausible factor.
 
     Looks for factors given by hand, and for measurements, that make a body less than half or more than twice as large.
@@ -66,7 +66,7 @@ def scale_factor(setup: Setup, found: Found) -> None:
 
 
 @rule("OSIM856", "swapped-sides", severity=WARNING, about="document")
-def swapped_sides(setup: Setup, found: Found) -> None:
+def swapped_sides(setup: Setup, found: FindingSink) -> None:
     """A marker of the right side was measured on the left, and its fellow on the right.
 
     Compares, for each two markers whose names differ by the side alone, the way from the left one to the right one with

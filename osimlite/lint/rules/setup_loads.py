@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.placement import Pose, Vector, dot
 from osimlite.lint.posture import poses_in
 from osimlite.lint.setup import Setup, members, motion_of
@@ -21,7 +21,7 @@ docs/public-projects.md that measure gaits none is farther than 0.275."""
 
 
 @rule("OSIM843", "load-columns", severity=ERROR, mends="both", about="document")
-def load_columns(setup: Setup, found: Found) -> None:
+def load_columns(setup: Setup, found: FindingSink) -> None:
     """The columns of a measured force are not in the data.
 
     Looks for the columns whose labels begin with the identifiers of an external force: there must be three of each.
@@ -90,7 +90,7 @@ def load_columns(setup: Setup, found: Found) -> None:
 
 
 @rule("OSIM849", "load-place", severity=WARNING, about="document")
-def load_place(setup: Setup, found: Found) -> None:
+def load_place(setup: Setup, found: FindingSink) -> None:
     """A measured force acts far away from its body, or is expressed in another frame than its setup says.
 
     Puts the model into poses of the motion that the tool is given, and looks where measured forces act: at more than

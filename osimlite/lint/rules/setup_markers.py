@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import islice
 from typing import Any
 
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.scan import number_in
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
@@ -24,7 +24,7 @@ def marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
 
 
 @rule("OSIM841", "marker-not-measured", severity=WARNING, about="document")
-def marker_not_measured(setup: Setup, found: Found) -> None:
+def marker_not_measured(setup: Setup, found: FindingSink) -> None:
     """A marker that is to be fitted is not in the data.
 
     Looks up each marker of the tasks, and of pairs that measure lengths, among the labels of the data, and of pairs in

@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 from osimlite.lint.checked import Where
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup
 from osimlite.lint.words import called, nearest_name
 from osimlite.schema.base import Component, Object, Unknown
@@ -26,7 +26,7 @@ _PLACES = {"Marker": "/markerset", "Force": "/forceset", "Controller": "/control
 
 
 @rule("OSIM831", "unknown-name", severity=ERROR, mends="both", about="document")
-def unknown_name(setup: Setup, found: Found) -> None:
+def unknown_name(setup: Setup, found: FindingSink) -> None:
     """A setup names what the model of its tool does not have.
 
     Looks up every marker, coordinate, body, joint, muscle and actuator that a setup, or a set that a setup reads, names
@@ -124,7 +124,7 @@ def _looked_up(setup: Setup, tree: Tree, use: Use, text: str) -> tuple[str | Non
     return what, text, target or (tree.walk(text, "", "Frame").target if what == "frame" else None)
 
 
-def _look_up_controls(setup: Setup, tool: Object, plain: set[str], found: Found) -> None:
+def _look_up_controls(setup: Setup, tool: Object, plain: set[str], found: FindingSink) -> None:
     """Tell controls, and columns of controls, that are those of no actuator."""
     if not plain:
         return
@@ -164,7 +164,7 @@ def _is_made(setup: Setup, text: str) -> bool:
 
 
 @rule("OSIM832", "excluded-force", severity=WARNING, mends="unsafe", about="document")
-def excluded_force(setup: Setup, found: Found) -> None:
+def excluded_force(setup: Setup, found: FindingSink) -> None:
     """Inverse dynamics is told to leave out a force that there is not.
 
     Compares `forces_to_exclude` with the words OpenSim knows (ALL, ACTUATORS, MUSCLES), the groups of the model's

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.lint.engine import ERROR, Found, rule
+from osimlite.lint.engine import ERROR, FindingSink, rule
 from osimlite.lint.setup import UNGIVEN, Setup, is_given, members
 from osimlite.lint.words import called, nearest_name
 
@@ -85,7 +85,7 @@ is lost.
 
 
 @rule("OSIM853", "scale-setting", severity=ERROR, about="document", faults=_FAULTS, frames=_FRAMES)
-def scale_setting(setup: Setup, found: Found) -> None:
+def scale_setting(setup: Setup, found: FindingSink) -> None:
     """A setting of the scale tool has no effect, or makes it fail.
 
     Looks at the mass, the order of scaling, measurements, axes, steps that are left out, and times that are averaged.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, meant, nearest_name
@@ -25,7 +25,7 @@ def _orientations(setup: Setup) -> Iterator[tuple[Any, str, str, Table]]:
 
 
 @rule("OSIM848", "sensor-without-frame", severity=WARNING, about="document")
-def sensor_without_frame(setup: Setup, found: Found) -> None:
+def sensor_without_frame(setup: Setup, found: FindingSink) -> None:
     """A measured sensor has no frame in the model, or a sensor that a tool names was not measured.
 
     Compares the columns of measured orientations with the frames of the model: inverse kinematics takes those that are

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from typing import Any
 
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.posture import angles_of
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.words import called
@@ -15,7 +15,7 @@ from osimlite.text import listed
 
 
 @rule("OSIM851", "task-weight", severity=ERROR, about="document")
-def task_weight(setup: Setup, found: Found) -> None:
+def task_weight(setup: Setup, found: FindingSink) -> None:
     """The weights of tasks make no sense.
 
     Looks for weights that are negative or no number, for tasks without weight (their default is 0), for markers and
@@ -59,7 +59,7 @@ def task_weight(setup: Setup, found: Found) -> None:
 
 
 @rule("OSIM854", "unreachable-task", severity=WARNING, about="document")
-def unreachable_task(setup: Setup, found: Found) -> None:
+def unreachable_task(setup: Setup, found: FindingSink) -> None:
     """A coordinate that is to be fitted cannot move, or cannot reach its value.
 
     Looks for tasks of locked coordinates, for values of which most are outside the range of a clamped coordinate, and

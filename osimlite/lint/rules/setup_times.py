@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.posture import angles_of, coordinate_of
 from osimlite.lint.rules.setup_columns import motions
 from osimlite.lint.setup import Setup, is_given, members
@@ -76,7 +76,7 @@ others before, as a spline does.
     "OSIM844", "time-outside-data", severity=WARNING, about="document", faults=_FAULTS,
     frames={name: f"```setup\n{frame}\n```" for name, frame in _FRAMES.items()},
 )  # fmt: skip
-def time_outside_data(setup: Setup, found: Found) -> None:
+def time_outside_data(setup: Setup, found: FindingSink) -> None:
     """A tool runs over times that its data do not have, or that make no sense.
 
     Compares the times of a tool with those of the tables that it reads: markers, coordinates, sensors. Computed muscle
@@ -184,7 +184,7 @@ def _data_of(item: Any) -> Iterator[tuple[str, str]]:
 
 
 @rule("OSIM845", "loads-end-early", severity=WARNING, about="document")
-def loads_end_early(setup: Setup, found: Found) -> None:
+def loads_end_early(setup: Setup, found: FindingSink) -> None:
     """Measured loads do not last as long as the run of the tool.
 
     Compares the times of the data of external loads with those of the tool, or of the motion that the tool is given.
@@ -228,7 +228,7 @@ def loads_end_early(setup: Setup, found: Found) -> None:
 
 
 @rule("OSIM846", "filter-frequency", severity=WARNING, about="document")
-def filter_frequency(setup: Setup, found: Found) -> None:
+def filter_frequency(setup: Setup, found: FindingSink) -> None:
     """A filter does not fit how often the data were measured.
 
     Compares the cut-off frequency with half the frequency of the rows, and points out a cut-off of 0.
@@ -259,7 +259,7 @@ def filter_frequency(setup: Setup, found: Found) -> None:
 
 
 @rule("OSIM847", "motion-in-degrees", severity=WARNING, about="document")
-def motion_in_degrees(setup: Setup, found: Found) -> None:
+def motion_in_degrees(setup: Setup, found: FindingSink) -> None:
     """Angles of a motion are in degrees, and OpenSim takes them for radians, or the other way round.
 
     Looks at the columns of rotational coordinates of a motion without `inDegrees=yes`: an angle of more than 10 is no

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup, is_given, members
 from osimlite.lint.words import called, nearest_name
 from osimlite.schema.tree import is_a
@@ -166,7 +166,7 @@ that.
 
 
 @rule("OSIM852", "tool-setting", severity=ERROR, about="document", faults=_FAULTS, frames=FRAMES)
-def tool_setting(setup: Setup, found: Found) -> None:
+def tool_setting(setup: Setup, found: FindingSink) -> None:
     """A tool has a setting with which it cannot work.
 
     Looks at accuracies and tolerances, steps, analyses, forces that are left out or replaced, and what is off.

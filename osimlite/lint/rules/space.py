@@ -8,7 +8,7 @@ from functools import cache
 from itertools import combinations
 
 from osimlite.lint.config import Threshold
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.placement import Pose, default_poses, fixed, on_base
 from osimlite.lint.skeleton import base_of
 from osimlite.lint.subject import Subject
@@ -26,7 +26,7 @@ POINTS = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_p
 
 
 @rule("OSIM411", "degenerate-frame", severity=ERROR)
-def degenerate_frame(subject: Subject, found: Found) -> None:
+def degenerate_frame(subject: Subject, found: FindingSink) -> None:
     """The points of a frame do not make a frame.
 
     Reports frames laid through stations of which two of the three that give the axes are in the same place, or which
@@ -107,7 +107,7 @@ LENGTH = Threshold("largest-length", 10.0, "m", "nothing on a body is longer")
 
 
 @rule("OSIM521", "starts-in-contact", severity=INFO, thresholds=(DEPTH, DEPTH_SHARE))
-def starts_in_contact(subject: Subject, found: Found) -> None:
+def starts_in_contact(subject: Subject, found: FindingSink) -> None:
     """Contact surfaces are inside each other in the default pose.
 
     Puts the model in its default pose and reports balls that start inside a half-space or another ball of their
@@ -146,7 +146,7 @@ def starts_in_contact(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM522", "lengths-in-millimetres", severity=WARNING, thresholds=(LENGTH,))
-def lengths_in_millimetres(subject: Subject, found: Found) -> None:
+def lengths_in_millimetres(subject: Subject, found: FindingSink) -> None:
     """A length on a body is longer than ten metres.
 
     Reports lengths and places, given in the frame of a body, beyond 10 m. What is fixed to ground may be far away, and
@@ -194,7 +194,7 @@ def _lengths(cls: type[Object]) -> tuple[FieldSpec, ...]:
 
 
 @rule("OSIM415", "no-direction", severity=WARNING)
-def no_direction(subject: Subject, found: Found) -> None:
+def no_direction(subject: Subject, found: FindingSink) -> None:
     """A direction has no length.
 
     Reports lines, axes and directions of constraints and actuators that are 0 0 0. It is an error for the line of a

@@ -6,7 +6,7 @@ import re
 
 from osimlite.document.lexical import reads_as
 from osimlite.document.notes import Note
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import renamed, without_element
 from osimlite.lint.old_tags import Successor, successor
 from osimlite.lint.rules.classes import part_for, set_for, wrapper_for
@@ -21,7 +21,7 @@ from osimlite.text import listed, nearest
 
 
 @rule("OSIM101", "unknown-tag", severity=ERROR, mends="both")
-def unknown_tag(subject: Subject, found: Found) -> None:
+def unknown_tag(subject: Subject, found: FindingSink) -> None:
     """An element is no property of the object it stands in.
 
     Reports child elements that their class does not have: misspelt, in the wrong case, of another class, or of another
@@ -101,7 +101,7 @@ def _is_said_again(subject: Subject, owner: Object, number: int) -> bool:
     return False
 
 
-def _report_old(subject: Subject, found: Found, note: Note, owner: Object, old: Successor) -> None:
+def _report_old(subject: Subject, found: FindingSink, note: Note, owner: Object, old: Successor) -> None:
     """Say that a tag is one of an older format."""
     instead = f"write <{old.tag}>" if old.tag is not None else ""
     words = "; " + ", ".join(part for part in (instead, old.hint) if part)
@@ -116,7 +116,7 @@ def _report_old(subject: Subject, found: Found, note: Note, owner: Object, old: 
 
 
 @rule("OSIM104", "duplicate-tag", severity=ERROR, mends="safe")
-def duplicate_tag(subject: Subject, found: Found) -> None:
+def duplicate_tag(subject: Subject, found: FindingSink) -> None:
     """A property is given twice.
 
     Reports every element after the first of the same property in one object.
@@ -152,7 +152,7 @@ def duplicate_tag(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM107", "element-in-value", severity=ERROR)
-def element_in_value(subject: Subject, found: Found) -> None:
+def element_in_value(subject: Subject, found: FindingSink) -> None:
     """A value has an element inside.
 
     Reports elements inside a number, a switch, a text or a reference, and comments and CDATA sections in the middle of

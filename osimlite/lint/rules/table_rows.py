@@ -7,13 +7,13 @@ from itertools import pairwise
 
 from osimlite.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.table import Table
 from osimlite.text import counted
 
 
 @rule("OSIM805", "no-rows", severity=ERROR, about="table")
-def no_rows(table: Table, found: Found) -> None:
+def no_rows(table: Table, found: FindingSink) -> None:
     """A table has no rows.
 
     Reports tables without any row.
@@ -37,7 +37,7 @@ def no_rows(table: Table, found: Found) -> None:
 
 
 @rule("OSIM806", "ragged-row", severity=ERROR, mends="safe", about="table")
-def ragged_row(table: Table, found: Found) -> None:
+def ragged_row(table: Table, found: FindingSink) -> None:
     """A row of a table is no row of numbers, or has too many or too few.
 
     Compares the cells of each row with the labels, and points out lines between the rows that are blank or remarks.
@@ -101,7 +101,7 @@ def _without_blank_lines(table: Table, first: int) -> Fix:
 
 
 @rule("OSIM807", "not-a-number", severity=ERROR, about="table")
-def not_a_number(table: Table, found: Found) -> None:
+def not_a_number(table: Table, found: FindingSink) -> None:
     """A cell of a table is no number.
 
     Finds words, NaN, infinity, decimal commas and whatever else is no number: once for each column, with the number of
@@ -143,7 +143,7 @@ def not_a_number(table: Table, found: Found) -> None:
 
 
 @rule("OSIM808", "time-order", severity=ERROR, about="table")
-def time_order(table: Table, found: Found) -> None:
+def time_order(table: Table, found: FindingSink) -> None:
     """A time of a table is not after the one before it.
 
     Finds rows with the time of the row before, and rows that go back in time.
@@ -178,7 +178,7 @@ def time_order(table: Table, found: Found) -> None:
 
 
 @rule("OSIM809", "time-gap", severity=WARNING, about="table")
-def time_gap(table: Table, found: Found) -> None:
+def time_gap(table: Table, found: FindingSink) -> None:
     """Rows are missing in a table of even times.
 
     Finds steps that are at least half as long again as the usual one, in tables in which nearly all steps are alike.

@@ -7,7 +7,7 @@ from math import nan
 
 from osimlite.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.table import Table
 from osimlite.tables import COUNTS, MARKER_KEYS, SUFFIXES, Entry, MarkerHeader
 from osimlite.text import counted, nearest
@@ -18,7 +18,7 @@ _TO_THE_END = 1_000_000
 
 
 @rule("OSIM801", "table-header", severity=ERROR, mends="safe", about="table")
-def table_header(table: Table, found: Found) -> None:
+def table_header(table: Table, found: FindingSink) -> None:
     """The header of a table is not as OpenSim needs it.
 
     Looks for the line `endheader` of a storage file, in small letters, and for `nRows` and `nColumns` where the older
@@ -86,7 +86,7 @@ def _saying(table: Table, entry: Entry, key: str, count: int) -> Fix | None:
     return table.replacing(entry.key.at._replace(length=_TO_THE_END), None, f"{key}={count}", certain=True)
 
 
-def _marker_header(table: Table, header: MarkerHeader, found: Found) -> None:
+def _marker_header(table: Table, header: MarkerHeader, found: FindingSink) -> None:
     if not table.data.startswith(b"PathFileType"):
         mark = table.data.startswith(b"\xef\xbb\xbf")
         why = "starts with a byte order mark; save it as UTF-8 without one" if mark else "must start with PathFileType"
@@ -131,7 +131,7 @@ def _marker_header(table: Table, header: MarkerHeader, found: Found) -> None:
 
 
 @rule("OSIM802", "table-count", severity=ERROR, mends="safe", about="table")
-def table_count(table: Table, found: Found) -> None:
+def table_count(table: Table, found: FindingSink) -> None:
     """A count in the header of a table is not that of the table.
 
     Compares `nRows` and `nColumns`, or `NumFrames` and `NumMarkers`, with the rows and the labels that there are.
@@ -185,7 +185,7 @@ def table_count(table: Table, found: Found) -> None:
 
 
 @rule("OSIM803", "table-setting", severity=ERROR, mends="safe", about="table")
-def table_setting(table: Table, found: Found) -> None:
+def table_setting(table: Table, found: FindingSink) -> None:
     """A setting in the header of a table has a value that OpenSim does not know.
 
     Looks at `inDegrees`, which is `yes` or `no`, at the letters that keys are written in, at `version`, `DataType`,
@@ -248,7 +248,7 @@ def table_setting(table: Table, found: Found) -> None:
         found(f"the version is a whole number, not '{version.value.text}'", at=version.value.at, severity=WARNING)
 
 
-def _cells(table: Table, found: Found) -> None:
+def _cells(table: Table, found: FindingSink) -> None:
     """What the newer reader of storage files makes of the type of the cells, and of blanks around keys."""
     kind = table.entries.get("DataType")
     if kind is not None and kind.value.text and kind.value.text not in SUFFIXES:
@@ -337,7 +337,7 @@ refuses the file.
 
 
 @rule("OSIM804", "column-label", severity=ERROR, about="table", faults=_FAULTS, frames=_FRAMES)
-def column_label(table: Table, found: Found) -> None:
+def column_label(table: Table, found: FindingSink) -> None:
     """A label of a table is missing, stands there twice, or is not as OpenSim needs it.
 
     The first column of a storage file is `time`, in small letters. Every column has a label of its own. Labels of

@@ -7,7 +7,7 @@ from typing import Final
 
 from osimlite.document.source import Source
 from osimlite.errors import NotWellFormedError, VersionError
-from osimlite.lint.engine import ERROR, INFO, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import renamed
 from osimlite.lint.subject import Subject
 from osimlite.schema.model import CURRENT_VERSION
@@ -31,7 +31,7 @@ _LATE: Final = (
 
 
 @rule("OSIM001", "syntax-error", severity=ERROR)
-def syntax_error(subject: Subject, found: Found) -> None:
+def syntax_error(subject: Subject, found: FindingSink) -> None:
     """The text is not well-formed XML.
 
     Reports where the XML parser gave up: a tag that is not closed, a stray `<` or `&`, a file that was cut off.
@@ -59,7 +59,7 @@ def _checked(subject: Subject) -> str:
 
 
 @rule("OSIM010", "unused-ignore", severity=INFO)
-def unused_ignore(subject: Subject, found: Found) -> None:
+def unused_ignore(subject: Subject, found: FindingSink) -> None:
     """A comment ignores what is not there.
 
     Reports `<!-- osimlite: ignore CODE -->` for each code of which nothing is found in its place. Such a comment speaks
@@ -80,7 +80,7 @@ def unused_ignore(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM002", "encoding", severity=WARNING)
-def encoding(subject: Subject, found: Found) -> None:
+def encoding(subject: Subject, found: FindingSink) -> None:
     """The bytes are not in the encoding that the file declares.
 
     Reports the first byte that is no UTF-8 (or whatever the XML declaration says). The file is then read as Windows
@@ -121,7 +121,7 @@ def encoding(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM003", "not-a-model", severity=ERROR, mends="unsafe")
-def not_a_model(subject: Subject, found: Found) -> None:
+def not_a_model(subject: Subject, found: FindingSink) -> None:
     """The document is XML, but no OpenSim model.
 
     Reports a root element other than `<OpenSimDocument>`, with the right spelling where that is known, and a document
@@ -156,7 +156,7 @@ def not_a_model(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM004", "document-version", severity=ERROR)
-def document_version(subject: Subject, found: Found) -> None:
+def document_version(subject: Subject, found: FindingSink) -> None:
     """The document has no version, or none that is read.
 
     Reports a `Version` that is missing, no whole number, too old to be read here, newer than OpenSim 4.6 writes, or
@@ -219,7 +219,7 @@ def _late_socket(source: Source) -> str:
 
 
 @rule("OSIM005", "merge-conflict", severity=ERROR)
-def merge_conflict(subject: Subject, found: Found) -> None:
+def merge_conflict(subject: Subject, found: FindingSink) -> None:
     """The file holds the marks of a merge that was not finished.
 
     Reports every line that begins with seven `<` or seven `>`.
@@ -243,7 +243,7 @@ def merge_conflict(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM006", "duplicate-attribute", severity=ERROR)
-def duplicate_attribute(subject: Subject, found: Found) -> None:
+def duplicate_attribute(subject: Subject, found: FindingSink) -> None:
     """An element has the same attribute twice.
 
     Reports two attributes with the same name.
@@ -264,7 +264,7 @@ def duplicate_attribute(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM007", "second-object", severity=ERROR)
-def second_object(subject: Subject, found: Found) -> None:
+def second_object(subject: Subject, found: FindingSink) -> None:
     """The document holds more than one object.
 
     Reports every element of the document after the first.
@@ -292,7 +292,7 @@ def _conflicts(source: Source) -> list[tuple[int, int]]:
     return [match.span() for match in _CONFLICT.finditer(source.text)]
 
 
-def _found_at(source: Source, found: Found, message: str, line: int | None, column: int | None) -> None:
+def _found_at(source: Source, found: FindingSink, message: str, line: int | None, column: int | None) -> None:
     found(message, at=source.position(_offset(source, line, column)))
 
 

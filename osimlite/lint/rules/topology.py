@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.skeleton import Link, Skeleton, growth, has_unknown_joints, skeleton
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
@@ -17,7 +17,7 @@ from osimlite.text import listed
 
 
 @rule("OSIM401", "unconnected-body", severity=ERROR)
-def unconnected_body(subject: Subject, found: Found) -> None:
+def unconnected_body(subject: Subject, found: FindingSink) -> None:
     """A body is not connected to ground.
 
     Reports bodies that no chain of joints connects to ground.
@@ -64,7 +64,7 @@ def unconnected_body(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM403", "closed-loop", severity=ERROR)
-def closed_loop(subject: Subject, found: Found) -> None:
+def closed_loop(subject: Subject, found: FindingSink) -> None:
     """Joints form a closed loop.
 
     Reports each joint that connects bodies which earlier joints have connected already.
@@ -99,7 +99,7 @@ def closed_loop(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM404", "parallel-joints", severity=ERROR)
-def parallel_joints(subject: Subject, found: Found) -> None:
+def parallel_joints(subject: Subject, found: FindingSink) -> None:
     """Two joints connect the same two bodies.
 
     Reports the second joint between one pair of bodies.
@@ -137,7 +137,7 @@ def parallel_joints(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM407", "massless-leaf", severity=ERROR)
-def massless_leaf(subject: Subject, found: Found) -> None:
+def massless_leaf(subject: Subject, found: FindingSink) -> None:
     """A body without mass is the last of its chain.
 
     Reports bodies of mass 0 that move and carry nothing with mass.

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 from osimlite.document.lexical import Unclean, flag, reads_as, real, split, whole
 from osimlite.document.notes import Note
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, shown
@@ -18,7 +18,7 @@ from osimlite.text import listed, nearest
 
 
 @rule("OSIM201", "unreadable-value", severity=ERROR, mends="safe")
-def unreadable_value(subject: Subject, found: Found) -> None:
+def unreadable_value(subject: Subject, found: FindingSink) -> None:
     """A value is no number, no switch, or not written as OpenSim reads it.
 
     Reports text that OpenSim cannot read: words where a number belongs, `yes` for a switch, commas or brackets
@@ -53,7 +53,7 @@ def unreadable_value(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM202", "wrong-count", severity=ERROR)
-def wrong_count(subject: Subject, found: Found) -> None:
+def wrong_count(subject: Subject, found: FindingSink) -> None:
     """A value has too many or too few numbers.
 
     Reports vectors and lists with another count than the property has.
@@ -77,7 +77,7 @@ def wrong_count(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM203", "cut-number", severity=ERROR, mends="unsafe")
-def cut_number(subject: Subject, found: Found) -> None:
+def cut_number(subject: Subject, found: FindingSink) -> None:
     """OpenSim reads only the beginning of a number.
 
     Reports numbers with something behind them: a decimal comma (`1,5`), a unit (`5kg`), a fraction (`1/3`), hexadecimal
@@ -102,7 +102,7 @@ def cut_number(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM204", "empty-value", severity=ERROR)
-def empty_value(subject: Subject, found: Found) -> None:
+def empty_value(subject: Subject, found: FindingSink) -> None:
     """An element that should hold a value is empty.
 
     Reports empty numbers, vectors and switches, and elements in which an object should stand. Properties that may be

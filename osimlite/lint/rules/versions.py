@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.lint.engine import ERROR, INFO, Found, rule
+from osimlite.lint.engine import ERROR, INFO, FindingSink, rule
 from osimlite.lint.history import NEWEST, later_than, new_properties
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
@@ -12,7 +12,7 @@ from osimlite.schema.specs import FieldSpec
 
 
 @rule("OSIM113", "newer-class", severity=ERROR)
-def newer_class(subject: Subject, found: Found) -> None:
+def newer_class(subject: Subject, found: FindingSink) -> None:
     """OpenSim has a class or a property only after the version that is aimed at.
 
     Reports objects of classes, and properties, that OpenSim has only after 4.6, or after the version that the setting

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from osimlite.lint.engine import ERROR, Found, rule
+from osimlite.lint.engine import ERROR, FindingSink, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
@@ -18,7 +18,7 @@ from osimlite.text import counted, nearest
 
 
 @rule("OSIM331", "control-function-count", severity=ERROR)
-def control_function_count(subject: Subject, found: Found) -> None:
+def control_function_count(subject: Subject, found: FindingSink) -> None:
     """A prescribed controller has not one function for each of its actuators.
 
     Compares the number of control functions with the number of actuators. Controllers that read their controls from a
@@ -56,7 +56,7 @@ def control_function_count(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM332", "broken-input", severity=ERROR, mends="unsafe")
-def broken_input(subject: Subject, found: Found) -> None:
+def broken_input(subject: Subject, found: FindingSink) -> None:
     """An input names an output that does not exist.
 
     Follows the inputs of reporters, controllers and geometry: the path of a component, a bar, and one of its outputs
@@ -93,7 +93,7 @@ def broken_input(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM333", "connected-twice", severity=ERROR)
-def connected_twice(subject: Subject, found: Found) -> None:
+def connected_twice(subject: Subject, found: FindingSink) -> None:
     """A list of sockets names the same component twice.
 
     Reports every mention of an actuator after the first in the list of one controller.

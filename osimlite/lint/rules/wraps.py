@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from osimlite.lint.engine import ERROR, WARNING, Found, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.placement import Pose, Vector, fixed, on_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
@@ -20,7 +20,7 @@ def _wraps(path: GeometryPath) -> list[PathWrap]:
 
 
 @rule("OSIM616", "swallowed-point", severity=WARNING)
-def swallowed_point(subject: Subject, found: Found) -> None:
+def swallowed_point(subject: Subject, found: FindingSink) -> None:
     """A point of a path lies inside a surface that the path wraps around.
 
     Reports points fixed to the body of a cylinder (which has no ends here), a sphere or an ellipsoid, and inside it,
@@ -61,7 +61,7 @@ def swallowed_point(subject: Subject, found: Found) -> None:
 
 
 @rule("OSIM617", "wrap-range", severity=WARNING)
-def wrap_range(subject: Subject, found: Found) -> None:
+def wrap_range(subject: Subject, found: FindingSink) -> None:
     """The range of a wrap holds no piece of the path.
 
     Reports wraps whose `range` ends at the point where it begins, or before it. A range that ends beyond the last

@@ -32,10 +32,10 @@ from osimlite.translate.mjcf.couplings import add_couplings
 from osimlite.translate.mjcf.draft import Contact, Draft, Fit, Follower, Lead, Options, Spline, Version, add
 from osimlite.translate.mjcf.driven import add_driven
 from osimlite.translate.mjcf.forces import add_forces
-from osimlite.translate.mjcf.haste import STEP, choose_step
 from osimlite.translate.mjcf.keyframe import add_keyframe
 from osimlite.translate.mjcf.paths import add_paths
 from osimlite.translate.mjcf.scenery import add_camera, add_markers, add_shapes
+from osimlite.translate.mjcf.time_step import STEP, choose_step
 from osimlite.translate.survey import account_for_rest
 
 Pass = Callable[[Draft], None]
