@@ -151,7 +151,7 @@ def prepare() -> None:
 def _counts(folder: Path, package: str, words: list[str]) -> dict[str, Any]:
     """Count in a new process; again if that was the one that made machine code."""
     result = folder / f"{'-'.join(words).replace('/', '') or 'calls'}.json"
-    path = os.pathsep.join((Path(package).parent.as_posix(), *map(os.path.abspath, filter(None, sys.path))))
+    path = os.pathsep.join((str(HERE), Path(package).parent.as_posix(), *map(os.path.abspath, filter(None, sys.path))))
     command = [sys.executable, "-S", str(HERE / "_counted.py"), str(result), path, package, *words]
     for _ in range(2):
         _run(command, folder, package)
