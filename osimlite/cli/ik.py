@@ -41,8 +41,9 @@ def ik(
     from osimlite.cli._console import say
     from osimlite.document.reader import read
     from osimlite.files import make_folder, write_atomically
-    from osimlite.fitting.ik_tool import motion_text, told
+    from osimlite.fitting.ik_tool import motion_table, told
     from osimlite.fitting.inverse_kinematics import inverse_kinematics
+    from osimlite.simulation.files.old_storage import UNITS, printed
     from osimlite.simulation.files.storage import write_sto
 
     weights = {name: _number(text, name) for name, text in options.named_words(weight, "--weight").items()}
@@ -52,7 +53,7 @@ def ik(
     )
     folder = options.results_folder(file, output)
     make_folder(folder)
-    write_atomically(folder / "ik.mot", motion_text(motion))
+    write_atomically(folder / "ik.mot", "".join(printed(motion_table(motion), f"\n{UNITS}")))
     errors = motion.marker_errors.tolist()
     write_sto(folder / "marker_errors.sto", "marker errors", motion.times.tolist(), motion.markers, errors)
     for line in told(motion):

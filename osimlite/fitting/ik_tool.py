@@ -23,7 +23,6 @@ from osimlite.schema.tools.inverse_kinematics import (
     IKTask,
     InverseKinematicsTool,
 )
-from osimlite.simulation.files.old_storage import NOTES, old_storage_text
 from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.text import counted, did_you_mean, listed
 
@@ -107,32 +106,9 @@ def run_inverse_kinematics(
     return fitted(model, mechanism, frames, tasks.weights, tasks.goals, tasks.wanted)
 
 
-def written(tool: InverseKinematicsTool, motion: FittedMotion) -> Iterator[tuple[str, str]]:
-    """Names, from the folder of the setup file, and texts of the files that the tool writes."""
-    times = motion.times.tolist()
-    if tool.output_motion_file not in UNNAMED:
-        yield tool.output_motion_file, motion_text(motion)
-    folder = Path(tool.results_directory or ".")
-    if tool.report_errors:
-        squares = motion.marker_errors**2
-        totals = squares.sum(axis=1)
-        rows = np.column_stack([totals, np.sqrt(totals / squares.shape[1]), np.sqrt(squares.max(axis=1))])
-        labels = ("total_squared_error", "marker_error_RMS", "marker_error_max")
-        text = old_storage_text("Model Marker Errors from IK", times, labels, rows.tolist())
-        yield str(folder / f"{tool.name}_ik_marker_errors.sto"), text
-    if tool.report_marker_locations:
-        columns = [f"{name}_t{axis}" for name in motion.markers for axis in "xyz"]
-        places = motion.places.reshape(len(times), -1).tolist()
-        text = old_storage_text("Model Marker Locations from IK", times, columns, places)
-        yield str(folder / f"{tool.name}_ik_model_marker_locations.sto"), text
-
-
-def motion_text(motion: FittedMotion) -> str:
+def motion_table(motion: FittedMotion) -> StoTable:
     """The coordinates as the tool writes them, in degrees."""
-    names = [info.name for info in motion.mechanism.coordinates]
-    return old_storage_text(
-        "Coordinates", motion.times.tolist(), names, motion.in_degrees.tolist(), in_degrees=True, notes=NOTES
-    )
+    return StoTable("Coordinates", motion.times, motion.coordinates, motion.in_degrees, in_degrees=True)
 
 
 def coordinate_table(name: str, folder: Path) -> StoTable | None:

@@ -17,7 +17,7 @@ from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
 from osimlite.schema.tools.inverse_kinematics import IKTask
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.files.old_storage import old_storage_text
+from osimlite.simulation.files.old_storage import printed
 from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.states import StateLayout, in_model_order
 
@@ -111,4 +111,5 @@ def pose_text(model: Model, placed: Placed) -> str:
         columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = value, 0.0
     own = [f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")]
     paths = in_model_order(model, [*own, *named])
-    return old_storage_text("static pose", motion.times.tolist(), paths, [[columns[path] for path in paths]])
+    row = np.array([[columns[path] for path in paths]])
+    return "".join(printed(StoTable("static pose", motion.times, tuple(paths), row)))

@@ -29,5 +29,5 @@ def run(job: Job, outcome: Outcome) -> None:
     exclude_forces(model, map(str, setup.forces_to_exclude))
     forces = force_elements(model, recorded.mechanism, external_loads=job.path("external_loads_file"), folder=None)
     table = recorded.inverse_dynamics(forces)
-    outcome.table(job.in_results(setup.output_gen_force_file), table.name, table.times, table.columns, table.rows)
+    outcome.table(job.in_results(setup.output_gen_force_file), table)
     outcome.tell("largest", f"{np.abs(table.rows).max():.6g}")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.fitting.ik_tool import run_inverse_kinematics, told
+from osimlite.fitting.ik_tool import motion_table, run_inverse_kinematics, told
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.schema.tools.inverse_kinematics import InverseKinematicsTool
-from osimlite.simulation.files.storage import read_sto
+from osimlite.simulation.files.old_storage import UNITS
+from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.tools.job import NONE, Job
-from osimlite.tools.outcome import UNITS, Outcome
+from osimlite.tools.outcome import Outcome
 
 
 def run(job: Job, outcome: Outcome) -> None:
@@ -18,22 +19,21 @@ def run(job: Job, outcome: Outcome) -> None:
     coordinates = job.path("coordinate_file")
     table = None if coordinates is None else read_sto(coordinates)
     motion = run_inverse_kinematics(setup, job.model(), MarkerData.of(job.needed("marker_file")), table)
-    times, count = motion.times, len(motion.times)
+    times = motion.times
     if setup.output_motion_file.strip() not in NONE:
-        names = [info.name for info in motion.mechanism.coordinates]
-        path, notes = job.result(setup.output_motion_file), f"\n{UNITS}"
-        outcome.table(path, "Coordinates", times, names, motion.in_degrees, in_degrees=True, description=notes)
+        outcome.table(job.result(setup.output_motion_file), motion_table(motion), f"\n{UNITS}")
     if setup.report_errors:
         squares = motion.marker_errors**2
         totals = squares.sum(axis=1)
         rows = np.column_stack([totals, np.sqrt(totals / squares.shape[1]), np.sqrt(squares.max(axis=1))])
-        labels = ["total_squared_error", "marker_error_RMS", "marker_error_max"]
+        labels = ("total_squared_error", "marker_error_RMS", "marker_error_max")
         path = job.in_results(f"{setup.name}_ik_marker_errors.sto")
-        outcome.table(path, "Model Marker Errors from IK", times, labels, rows)
+        outcome.table(path, StoTable("Model Marker Errors from IK", times, labels, rows))
     if setup.report_marker_locations:
-        labels = [f"{name}_t{axis}" for name in motion.markers for axis in "xyz"]
+        columns = tuple(f"{name}_t{axis}" for name in motion.markers for axis in "xyz")
         path = job.in_results(f"{setup.name}_ik_model_marker_locations.sto")
-        outcome.table(path, "Model Marker Locations from IK", times, labels, motion.places.reshape(count, -1))
+        places = motion.places.reshape(len(times), -1)
+        outcome.table(path, StoTable("Model Marker Locations from IK", times, columns, places))
     outcome.summary |= motion.summary
     for words in told(motion):
         outcome.tell("markers", words)

@@ -14,6 +14,7 @@ from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.schema.model import Model
+from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
 from osimlite.text import did_you_mean
@@ -137,7 +138,5 @@ class Tables:
         """
         setup = self.job.setup
         path: Path = self.job.in_results(f"{setup.name}_{self.name}{of}_{suffix}.sto")
-        self.outcome.table(
-            path, title, self.times, columns, rows, in_degrees=in_degrees, description=description,
-            precision=setup.output_precision,
-        )  # fmt: skip
+        table = StoTable(title, self.times, tuple(columns), rows, in_degrees)
+        self.outcome.table(path, table, description, setup.output_precision)

@@ -2,45 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from osimlite.files import make_folder, written_atomically
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, field
+from osimlite.records import dataclass, field, replace
+from osimlite.simulation.files.old_storage import PRECISION, printed
 from osimlite.simulation.files.storage import StoTable
-
-DEGREES = (
-    "If the header above contains a line with 'inDegrees', this indicates whether rotational values are in degrees "
-    "(yes) or radians (no).\n"
-)
-UNITS = f"Units are S.I. units (second, meters, Newtons, ...)\n{DEGREES}"
-"""What OpenSim says of its tables in their headers."""
-PRECISION = 8
-"""Digits behind the point that OpenSim prints unless it is told otherwise."""
-_PADDING = 8
-
-
-def printed(table: StoTable, description: str = "", precision: int = PRECISION) -> Iterator[str]:
-    """The lines of a table as OpenSim's ``Storage`` prints it.
-
-    Args:
-        table: the table.
-        description: what stands before the end of the header; a line end is added.
-        precision: digits behind the point.
-    """
-    yield f"{table.name}\nversion=1\nnRows={len(table.times)}\nnColumns={len(table.columns) + 1}\n"
-    yield f"inDegrees={'yes' if table.in_degrees else 'no'}\n"
-    if description:
-        yield f"{description}\n"
-    yield "endheader\n"
-    yield "\t".join(("time", *table.columns)) + "\n"
-    line = "\t".join([f"%{precision + _PADDING}.{precision}f"] * (len(table.columns) + 1)) + "\n"
-    for row in np.column_stack([table.times, table.rows]).tolist():
-        yield line % tuple(row)
 
 
 @dataclass(eq=False)
@@ -62,32 +30,16 @@ class Outcome:
     done: bool = True
     _texts: dict[Path, tuple[str | StoTable, str, int]] = field(default_factory=dict)
 
-    def table(
-        self,
-        path: Path,
-        name: str,
-        times: Array,
-        columns: Sequence[str],
-        rows: Array,
-        *,
-        in_degrees: bool = False,
-        description: str = "",
-        precision: int = PRECISION,
-    ) -> None:
+    def table(self, path: Path, table: StoTable, description: str = "", precision: int = PRECISION) -> None:
         """Have a table written as OpenSim prints it.
 
         Args:
             path: of the file.
-            name: first line of the file.
-            times: (t,), s.
-            columns: labels (m,).
-            rows: (t, m).
-            in_degrees: whether rotational values are in degrees.
+            table: what is printed.
             description: what the header says besides.
             precision: digits behind the point.
         """
-        table = StoTable(name, times, tuple(columns), rows, in_degrees, file=str(path))
-        self.tables[path.name] = table
+        self.tables[path.name] = replace(table, file=str(path))
         self._texts[path] = table, description, precision
 
     def text(self, path: Path, content: str) -> None:

@@ -98,6 +98,11 @@ def test_an_analysis_that_cannot_be_computed_is_refused_before_anything_is_writt
     for analysis, said in (
         ("StaticOptimization name='SO'", "'SO' is a StaticOptimization"),
         ("JointReaction name='JR'", "'JR' is a JointReaction"),
+        (
+            "BodyKinematics name='B'><express_results_in_body_local_frame>true</express_results_in_body_local_frame>"
+            "</BodyKinematics><Kinematics",
+            "in the frames of bodies",
+        ),
         ("PointKinematics name='P'><step_interval>3</step_interval></PointKinematics><Kinematics", "leaves rows out"),
     ):
         text = SETUP.replace("InverseDynamicsTool", "AnalyzeTool")

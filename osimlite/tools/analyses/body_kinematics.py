@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.errors import UnsupportedError
 from osimlite.multibody.dynamics import MassCentres
 from osimlite.multibody.spatial import angles_xyz
 from osimlite.schema.tools.analyses import BodyKinematics
+from osimlite.simulation.files.old_storage import DEGREES
 from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.outcome import DEGREES
+from osimlite.tools.not_runnable import NotRunnable
 
 WHOLE = "center_of_mass"
 
@@ -17,7 +17,10 @@ WHOLE = "center_of_mass"
 def compute(analysis: BodyKinematics, motion: Motion, tables: Tables) -> None:
     """Write places with body-fixed X-Y-Z angles, velocities and accelerations, in ground."""
     if analysis.express_results_in_body_local_frame:
-        raise UnsupportedError(f"'{analysis.name}' asks for results in the frames of bodies, which is not done yet")
+        raise NotRunnable(
+            f"'{analysis.name}' asks for results in the frames of bodies, which is not done yet",
+            file=str(tables.job.file),
+        )
     mechanism = motion.mechanism
     own = {body.name: place for place, body in enumerate(mechanism.bodies)}
     names = [body.name for body in motion.model.body_set.objects]

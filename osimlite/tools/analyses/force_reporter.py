@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.errors import UnsupportedError
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.tools.analyses import ForceReporter
+from osimlite.simulation.files.old_storage import UNITS
 from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.outcome import UNITS
+from osimlite.tools.not_runnable import NotRunnable
 
 ENERGY = "PotentialEnergy"
 _DESCRIPTION = (
@@ -21,7 +21,9 @@ _DESCRIPTION = (
 def compute(analysis: ForceReporter, motion: Motion, tables: Tables) -> None:
     """Write the columns of every force."""
     if analysis.include_constraint_forces and motion.simulation.constraints:
-        raise UnsupportedError(f"'{analysis.name}' asks for the forces of constraints, which is not done yet")
+        raise NotRunnable(
+            f"'{analysis.name}' asks for the forces of constraints, which is not done yet", file=str(tables.job.file)
+        )
     engine = motion.simulation.engine
     rows = [engine.force_records(t, y) for t, y in motion.moments]
     # These energies have one label, however many there are.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.schema.tools.analyses import Kinematics
+from osimlite.simulation.files.old_storage import UNITS
 from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.outcome import UNITS
 
 
 def compute(analysis: Kinematics, motion: Motion, tables: Tables) -> None:

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.errors import UnsupportedError
 from osimlite.multibody.spatial import Array
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.tools.analyses import MuscleAnalysis
+from osimlite.simulation.files.old_storage import UNITS
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.paths import Paths
 from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.outcome import UNITS
+from osimlite.tools.not_runnable import NotRunnable
 
 CHECKED = ("Millard2012EquilibriumMuscle", "Thelen2003Muscle")
 """The classes whose results were held to OpenSim's."""
@@ -30,8 +30,9 @@ def compute(analysis: MuscleAnalysis, motion: Motion, tables: Tables) -> None:
     muscles = [every[place] for place in chosen]
     for muscle in muscles:
         if type(muscle).__name__ not in CHECKED:
-            raise UnsupportedError(
-                f"'{analysis.name}' asks for '{muscle.name}', a {type(muscle).__name__}, which it cannot analyse yet"
+            raise NotRunnable(
+                f"'{analysis.name}' asks for '{muscle.name}', a {type(muscle).__name__}, which it cannot analyse yet",
+                file=str(tables.job.file),
             )
     names = [muscle.name for muscle in muscles]
     tree = motion.model.tree()

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.errors import UnsupportedError
 from osimlite.multibody.spatial import cross
 from osimlite.schema.tools.analyses import PointKinematics
 from osimlite.tools.motion import Motion, Tables
+from osimlite.tools.not_runnable import NotRunnable
 
 
 def compute(analysis: PointKinematics, motion: Motion, tables: Tables) -> None:
     """Write the three, in ground."""
     beside = str(analysis.relative_to_body_name)
     if beside not in ("", "none", "ground", "/ground"):
-        raise UnsupportedError(f"'{analysis.name}' asks for a point relative to '{beside}', which is not done yet")
+        raise NotRunnable(
+            f"'{analysis.name}' asks for a point relative to '{beside}', which is not done yet",
+            file=str(tables.job.file),
+        )
     frame = motion.mechanism.placement(str(analysis.body_name))
     station = frame.transform[:3, :3] @ np.array(analysis.point) + frame.transform[:3, 3]
     rows = np.empty((3, len(motion.times), 3))
