@@ -6,6 +6,7 @@ What scales by what is in the `facts` of the classes; the rules for inertias are
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from math import sqrt
 from typing import Any
 
@@ -58,8 +59,8 @@ def scale_model(
     """
     before = path_lengths(model)
     scaler = _Scaler(model, factors)
-    for component in list(model.components()):
-        if not model.tree().is_internal(component):
+    for component in scaler.tree.components:
+        if not scaler.tree.is_internal(component):
             scaler.scale(component)
     for body in model.components(Body):
         own = scaler.of_base(body)
@@ -92,6 +93,7 @@ def path_lengths(model: Model) -> dict[str, float]:
     return {path: lengths[path] for path in (item.path for item in owners) if path in lengths}
 
 
+@cache
 def scales(cls: type[Any]) -> dict[str, str]:
     """What each property of a class is multiplied by when a model is scaled, see `Facts.scales`."""
     found: dict[str, str] = {}

@@ -14,7 +14,7 @@ from osimlite.schema.equality import same
 from osimlite.schema.facts import Contradiction, Facts
 from osimlite.schema.fields import Many, ObjectList, Reference, Tag, note_change
 from osimlite.schema.layout import Home, Layout
-from osimlite.schema.specs import FieldSpec, defaults, field_specs, holding, reference_specs
+from osimlite.schema.specs import FieldSpec, defaults, field_specs, holding, numeric_names, reference_specs
 
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass
@@ -193,7 +193,7 @@ class Object(BaseModel, metaclass=ObjectType):
             if spec is None:
                 raise MissingNameError(misspelt(type(self), name))
             name = spec.name
-        note_change(self._model)
+        note_change(self._model, numbers_only=name in numeric_names(type(self)))
         try:
             super().__setattr__(name, value)
         except ValidationError as error:

@@ -193,14 +193,14 @@ class NamesOf:
     reference: Reference
 
 
-def note_change(owner: Any) -> None:
-    """Tell the model that a changed object or list was last seen in that its index is out of date.
+def note_change(owner: Any, *, numbers_only: bool = False) -> None:
+    """Tell the model that an object or list was last seen in that it is about to change.
 
     What was in no index yet changes none: it came, or comes, into a model by a change of what is there.
     """
     model = None if owner is None else owner.model
     if model is not None:
-        model.outdate()
+        model.outdate(numbers_only=numbers_only)
 
 
 class ObjectList(list[T]):

@@ -95,15 +95,15 @@ class Model(ModelComponent):
 
         known = getattr(self, "_tree", None)
         if known is None or not known.is_current:
-            known = Tree(self, known)
+            known = Tree(self) if known is None else known.renewed()
             object.__setattr__(self, "_tree", known)
         return cast("Tree", known)
 
-    def outdate(self) -> None:
-        """Something of the model is about to change: its index is to be made anew before it is used again."""
+    def outdate(self, *, numbers_only: bool = False) -> None:
+        """Something of the model is about to change: its index is made anew before its next use."""
         known = getattr(self, "_tree", None)
         if known is not None:
-            known.outdate()
+            known.outdate(numbers_only=numbers_only)
 
     @overload
     def components(self) -> Iterator[Component]: ...

@@ -114,6 +114,13 @@ def reference_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
 
 
 @cache
+def numeric_names(cls: type[Object]) -> frozenset[str]:
+    """The attributes of `cls` with numbers and switches: no path and no reference of a model depends on them."""
+    values = (spec for spec in field_specs(cls).values() if isinstance(spec.kind, Value))
+    return frozenset(spec.name for spec in values if cast("Value", spec.kind).scalar != "string")
+
+
+@cache
 def file_specs(cls: type[Object], rule: str) -> tuple[FieldSpec, ...]:
     """The properties of `cls` that name files by a rule: ``file``, ``output-file`` or ``output-folder``."""
     return tuple(spec for spec in reference_specs(cls) if spec.reference.rule == rule)

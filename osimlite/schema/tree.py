@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import copy
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from weakref import WeakSet
@@ -86,6 +87,8 @@ class Tree:
         self._others: WeakSet[Tree] = WeakSet()
         if previous is not None:
             self._others.update(other for other in previous._others if other.is_current)
+        # Who shares objects with another model has to claim them anew.
+        self._is_renewable = not self._others
         self.model = model
         self.components: list[Component] = []
         self.by_path: dict[str, Component] = {}
@@ -113,22 +116,33 @@ class Tree:
         self._place(model, "")
         self._known_parts = {}
 
-    def outdate(self) -> None:
-        """Something that is in the tree is about to change."""
+    def outdate(self, *, numbers_only: bool = False) -> None:
+        """Something of the model is about to change; paths and names hold if it is only a number or a switch."""
         for tree in (self, *self._others):
             if tree.is_current:
                 for snapshot in list(tree.snapshots):
                     _ = snapshot.model
                 tree.is_current = False
                 tree.kept.clear()
+            tree._is_renewable &= numbers_only
+
+    def renewed(self) -> Tree:
+        """The tree of the model as it is now: with the same paths and names if only numbers have changed."""
+        if not self._is_renewable:
+            return Tree(self.model, self)
+        tree = copy(self)
+        tree.is_current, tree.snapshots, tree.kept = True, WeakSet(), {}
+        return tree
 
     def _claim(self, owner: Any) -> Model:
         """The model, as the one that an object or a list was last seen in; another may have it too."""
         known = None if owner is None else owner.model
         if known is not None and known is not self.model:
             other = getattr(known, "_tree", None)
-            if other is not None and other.is_current:
-                self._others.add(other)
+            if other is not None:
+                self._is_renewable = other._is_renewable = False
+                if other.is_current:
+                    self._others.add(other)
         return self.model
 
     def path_of(self, component: Object) -> str | None:

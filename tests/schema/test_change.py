@@ -54,6 +54,30 @@ def test_every_change_of_a_model_makes_its_own_index_anew(way, change):
     assert other.tree() is theirs
 
 
+@pytest.mark.parametrize("shared_before", [False, True])
+def test_a_number_changes_no_path_and_what_is_shared_stays_known(shared_before):
+    model, other = carrying(), Model(name="other")
+    body = model["/bodyset/b"]
+    if shared_before:
+        other.body_set.objects.append(body)
+        other.tree()
+    before = model.tree()
+    body.mass = 2.0
+    after = model.tree()
+    assert not before.is_current and after is not before and after.is_current
+    assert after.components == before.components and model["/bodyset/b"] is body
+    if not shared_before:
+        other.body_set.objects.append(body)
+        other.tree()
+        body.mass = 3.0
+        model.tree()
+    other.tree()
+    body.name = "c"
+    assert model["/bodyset/c"] is body and other["/bodyset/c"] is body
+    body.mass, body.name = 4.0, "d"
+    assert model["/bodyset/d"] is body and other["/bodyset/d"] is body
+
+
 def test_what_came_later_belongs_to_the_model_too():
     model = carrying()
     body = Body(name="late")
