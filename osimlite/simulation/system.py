@@ -161,6 +161,23 @@ class System:
         self.note_loads(self._pairs[:, :3])
         return self.found()
 
+    def missing(self, t: float, y: Sequence[float], udot: Sequence[float]) -> list[float]:
+        """Generalized forces (n,) that a state needs for accelerations (n,) beside gravity and all that pushes.
+
+        Both are in the order of the state. Constraints are left aside.
+
+        Raises:
+            SimulationError: the rates of coordinates are not defined there, or a force cannot be computed.
+        """
+        self._set(t, y)
+        count = len(self.order)
+        self._f[count : 2 * count] = udot
+        inverse = self.program.code.entry("inverse")
+        status = self._run(inverse, self.program.ints, self.numbers, self._w, self._y, self._f, 0)
+        if status != layout.OK:
+            raise self.refusal(status, t, y)
+        return self._f[count : 2 * count].tolist()
+
     def equilibrated(self, t: float, y: Sequence[float], numbers: Floats | None = None) -> list[float]:
         """A state (y,) with the auxiliary states that have an equilibrium in it, as Model::equilibrateMuscles gives it.
 

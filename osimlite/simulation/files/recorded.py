@@ -227,16 +227,14 @@ class RecordedMotion:
             SimulationError: a force cannot be computed at one of the states.
         """
         mechanism = self.mechanism
-        system = System(mechanism.released(), forces) if forces is not None and forces.elements else None
+        system = System(mechanism.released(), forces or Forces(()))
+        order = list(system.order)
         first, second = self.rates
         rows = np.empty_like(self.values)
         for time, row, q, qdot, qddot in zip(self.times.tolist(), rows, self.values, first, second, strict=True):
             u = mechanism.speeds_from_rates(q, qdot)
             udot = mechanism.speeds_from_rates(q, qddot - mechanism.rate_bias(q, u))
-            row[:] = mechanism.inverse_dynamics(q, u, udot)
-            if system is not None:
-                applied = system.applied(time, system.state.pack(q.tolist(), u.tolist()))
-                row[list(system.order)] -= applied[len(q) : 2 * len(q)]
+            row[order] = system.missing(time, system.state.pack(q.tolist(), u.tolist()), udot[order])
         order = [place for body in mechanism.bodies for place in body.mobilizer.coordinates]
         infos = [mechanism.coordinates[place] for place in order]
         labels = [f"{info.name}_{'moment' if info.motion_type == 'rotational' else 'force'}" for info in infos]

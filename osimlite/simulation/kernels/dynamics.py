@@ -8,7 +8,7 @@ degrees of freedom times the square of how many of them carry one another.
 
 from __future__ import annotations
 
-from osimlite.forces.vectors import Vector, cross, dot, minus, plus, put, times, turned, vector
+from osimlite.forces.vectors import ZERO, Vector, along, cross, dot, minus, plus, put, times, turned, vector
 from osimlite.simulation.kernels.layout import (
     ABOVE,
     ACCELERATION,
@@ -100,6 +100,34 @@ def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) ->
     return OK
 
 
+def inverse(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> int:
+    """The generalized forces that are missing for accelerations, constraints left aside.
+
+    Args:
+        s: the mechanism.
+        x: its numbers.
+        w: room.
+        y: the state.
+        f: udot behind the place of the rates; the forces (N, N m) take its place.
+        unused: any number.
+
+    Returns:
+        OK or what went wrong, as of `evaluate`.
+    """
+    place(s, x, w, y, f)
+    status = move(s, x, w, y, f)
+    if status != OK:
+        return status
+    right = at(f, s[FREEDOMS])
+    accelerate(s, w, right)
+    spatial_inertias_and_bias(s, x, w)
+    status = apply_forces(s, x, w, y, f)
+    generalized_forces(s, w, right)
+    for freedom in range(s[FREEDOMS]):
+        right[freedom] = -right[freedom]
+    return status
+
+
 def equilibrate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) -> int:
     """Bring what can be into equilibrium: changes auxiliary states in y, also after one has failed.
 
@@ -156,6 +184,25 @@ def spatial_inertias_and_bias(s: Ints, x: Floats, w: Floats) -> None:
         torque = plus(torque, plus(cross(spin, angular), cross(velocity, linear)))
         put(here, WRENCH, times(-1.0, torque))
         put(here, WRENCH + 3, times(-1.0, plus(force, cross(spin, linear))))
+
+
+def accelerate(s: Ints, w: Floats, udot: Floats) -> None:
+    """Add what udot gives to the accelerations of the links, outwards from ground."""
+    columns = at(w, s[WORK_COLUMN])
+    for link in range(s[LINKS]):
+        j, here = at(s, s[LINK_AT] + LINK_INTS * link), at(w, s[WORK_LINK] + LINK_WORK * link)
+        # The wrench is not needed yet; its place has what the links before add.
+        turn, shift = ZERO, ZERO
+        if j[PARENT] >= 0:
+            above = at(w, s[WORK_LINK] + LINK_WORK * j[PARENT] + WRENCH)
+            turn, shift = vector(above, 0), vector(above, 3)
+        for freedom in range(j[FIRST_FREEDOM], j[END_FREEDOM]):
+            c = at(columns, 6 * freedom)
+            turn, shift = along(turn, udot[freedom], vector(c, 0)), along(shift, udot[freedom], vector(c, 3))
+        put(here, WRENCH, turn)
+        put(here, WRENCH + 3, shift)
+        put(here, ACCELERATION, plus(vector(here, ACCELERATION), turn))
+        put(here, ACCELERATION + 3, plus(vector(here, ACCELERATION + 3), shift))
 
 
 def clear_wrenches(s: Ints, w: Floats) -> None:

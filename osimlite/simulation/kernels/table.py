@@ -69,6 +69,7 @@ LAW_MODULES = {
     "watch": "poses",
     "wrapped_path": "path_wraps",
     "geodesic_path": "geodesic_paths",
+    "inverse": "dynamics",
 }
 """The module of each of the engine's own."""
 
