@@ -161,7 +161,7 @@ class System:
         self.note_loads(self._pairs[:, :3])
         return self.found()
 
-    def missing(self, t: float, y: Sequence[float], udot: Sequence[float]) -> list[float]:
+    def missing(self, t: float, y: Sequence[float], udot: Sequence[float] | Floats) -> list[float]:
         """Generalized forces (n,) that a state needs for accelerations (n,) beside gravity and all that pushes.
 
         Both are in the order of the state. Constraints are left aside.
