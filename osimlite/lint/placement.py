@@ -80,6 +80,10 @@ class Pose(NamedTuple):
         return Pose(back.rotation, (-x, -y, -z))
 
 
+End = tuple[Component, Pose] | None
+"""The body or ground that a frame is fixed to, and where it is on it."""
+
+
 def dot(one: Vector, other: Vector) -> float:
     """The scalar product."""
     return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
@@ -105,7 +109,7 @@ def fixed(angles: Vector, position: Vector) -> Pose:
     return Pose(about(X, angles[0]).then(about(Y, angles[1])).then(about(Z, angles[2])).rotation, position)
 
 
-def on_base(subject: Subject, frame: Component | None) -> tuple[Component, Pose] | None:
+def on_base(subject: Subject, frame: Component | None) -> End:
     """The body or ground that a frame is fixed to, and where it is on it; None if that is not known."""
     pose, seen = Pose(), 0
     while isinstance(frame, PhysicalOffsetFrame) and seen < 100:
@@ -120,6 +124,13 @@ def default_poses(subject: Subject) -> dict[int, Pose]:
     return poses_at(subject)
 
 
+@once
+def _ends(subject: Subject) -> dict[int, tuple[End, End]]:
+    """Where the frames of the joints are, by the identities of these."""
+    links = skeleton(subject).links
+    return {id(link.joint): (on_base(subject, link.parent), on_base(subject, link.child)) for link in links}
+
+
 def poses_at(subject: Subject, values: Mapping[str, float] | None = None) -> dict[int, Pose]:
     """The pose in ground of each body (by identity) whose place is known.
 
@@ -128,13 +139,13 @@ def poses_at(subject: Subject, values: Mapping[str, float] | None = None) -> dic
         values: those of coordinates, rad or m; others have their default values. Given, places may be off by some
             centimetres.
     """
-    bones = skeleton(subject)
+    bones, ends = skeleton(subject), _ends(subject)
     poses: dict[int, Pose] = {id(bones.ground): Pose()}
     pending: list[Component] = [bones.ground]
     while pending:
         base = pending.pop(0)
         for link in bones.of(base):
-            parent, child = on_base(subject, link.parent), on_base(subject, link.child)
+            parent, child = ends[id(link.joint)]
             motion = _motion(link.joint, values)
             if parent is None or child is None or motion is None:
                 continue

@@ -246,6 +246,8 @@ class Mechanism:
     def speeds_from_rates(self, q: Values, qdot: Values) -> Array:
         """Generalized speeds (n,) for given rates of the coordinates; raises as :meth:`rate_matrix`."""
         rates = self._array(qdot, "rate")
+        if not self._turning:
+            return rates.copy()
         return np.asarray(np.linalg.solve(self.rate_matrix(q), rates), dtype=np.float64)
 
     # -------------------------------------------------------------------------------------------- dynamics

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from osimlite._load import module_name
-from osimlite.document.reader import read_any
+from osimlite.document.reader import collector_paused, read_any
 from osimlite.errors import DocumentError
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report, merged
@@ -38,6 +38,7 @@ class FaultySetup(DocumentError):
         self.report = report
 
 
+@collector_paused()
 def run(setup: str | Path, output: str | Path | None = None, *, check: bool = True) -> Outcome:
     """Run the setup of a tool as OpenSim would, and write the files that it would write.
 
