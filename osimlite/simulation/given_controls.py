@@ -59,7 +59,7 @@ def driven(controls: Controls, given: Mapping[str, Any] | StoTable | str | Path 
         SettingError: a control is no number, or times do not increase.
         SimulationError: a TableSource of the model does not go as far as the motion.
     """
-    _require_tables(controls, to)
+    require_tables(controls, 0.0, to)
     if given is None:
         return controls
     known = {key: name for name in controls.names for key in (name.rpartition("/")[2], name)}
@@ -116,14 +116,14 @@ def words_to_controls(words: Iterable[str]) -> dict[str, Any]:
     return found
 
 
-def _require_tables(controls: Controls, to: float) -> None:
+def require_tables(controls: Controls, start: float, to: float) -> None:
     """SimulationError if a TableSource, outside of whose times there is nothing, does not go as far as the motion."""
     for function in (function for functions in controls.functions for function in functions):
         column = function.function if isinstance(function, Scaled) else function
-        if isinstance(column, TableColumn) and not column.x[0] <= 0.0 < to <= column.x[-1]:
+        if isinstance(column, TableColumn) and not column.x[0] <= start < to <= column.x[-1]:
             raise SimulationError(
                 f"the table of '{column.source}' goes from {column.x[0]:g} to {column.x[-1]:g} s, and the motion from "
-                f"0 to {to:g} s; outside of it OpenSim stops"
+                f"{start:g} to {to:g} s; outside of it OpenSim stops"
             )
 
 

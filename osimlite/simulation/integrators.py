@@ -23,6 +23,8 @@ method and 0.07 by Merson's.
 
 INITIAL_STEP = 0.01
 """First step tried, s: a tenth of Simbody's default time scale."""
+NO_BOUNDS = 0.0, inf
+"""Of the lengths of steps, s."""
 
 
 PATIENCE = 10_000

@@ -24,7 +24,7 @@ from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.engines.protocol import Engine
-from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, check_integrator
+from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, NO_BOUNDS, check_integrator
 from osimlite.simulation.runs import Floats, Ints, Runs, Watch
 
 __all__ = ["ENDINGS", "BatchEngine", "BatchOptions", "Renewal", "Renewed", "Runs", "Watch", "run_many"]
@@ -50,6 +50,7 @@ class BatchOptions:
         event_states: keep the states at the events.
         most_tries: steps that a run may try.
         threads: how many work; by default one for each core.
+        step_bounds: of the steps, see :class:`osimlite.simulation.engines.protocol.Settings`.
     """
 
     to: float = 2.0
@@ -61,6 +62,7 @@ class BatchOptions:
     event_states: bool = False
     most_tries: int = NO_LIMIT
     threads: int | None = None
+    step_bounds: tuple[float, float] = NO_BOUNDS
 
     def check(self) -> None:
         """SettingError for what has no meaning; machine code might go on with it forever."""

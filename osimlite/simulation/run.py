@@ -32,7 +32,7 @@ from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.start import in_units_of, starting, state_in, suspect_value
 from osimlite.simulation.states import in_model_order
-from osimlite.simulation.stepper import Progress, Stepper
+from osimlite.simulation.stepper import Observer, Progress, Stepper
 from osimlite.simulation.summary import integration_summary, result_summary, versions
 from osimlite.simulation.trajectory import Interrupted, Report, Trajectory
 
@@ -264,6 +264,41 @@ class Simulation:
             raise Interrupted(trajectory)
         return trajectory
 
+    def every_step(
+        self, start: float, y: Sequence[float], to: float, settings: Settings
+    ) -> tuple[list[float], list[list[float]], SimulationError | None]:
+        """Follow a motion from a time other than 0, and keep all steps.
+
+        Args:
+            start: time at which it begins, s.
+            y: the state then, in the engine's order, where the constraints hold.
+            to: end of the motion, s.
+            settings: how to step.
+
+        Returns:
+            Times (s) and states of the start and of the ends of all steps, and what ended the motion before its end.
+
+        Raises:
+            SimulationError: it cannot begin.
+        """
+        from osimlite.simulation.given_controls import require_tables
+
+        times, states = [start], [list(y)]
+
+        def note(t: float, y: list[float]) -> None:
+            times.append(t)
+            states.append(y)
+
+        with self._lock:
+            require_tables(self.forces.controls, start, to)
+            self._require_inertia(y)
+            stepper = self._stepper(start, y, settings, note)
+            stepper.table([to])
+            stepper.catch_up()
+        if isinstance(stepper.ended, KeyboardInterrupt):
+            raise stepper.ended
+        return times, states, stepper.ended
+
     def look_again(self) -> None:
         """Have the next start checked, too, for motions without inertia."""
         self._has_inertia = False
@@ -291,9 +326,13 @@ class Simulation:
     ) -> tuple[Recorder, Stepper, Sequence[Any]]:
         """What was recorded and integrated from a state, and the states at times (s)."""
         recorder = Recorder(self.engine)
-        stepper = self.engine.stepper(0.0, y, settings, recorder.observe)
+        stepper = self._stepper(0.0, y, settings, recorder.observe)
         recorder.begin(stepper)
         return recorder, stepper, stepper.table(times, progress)
+
+    @any_numbers
+    def _stepper(self, start: float, y: Sequence[float], settings: Settings, observe: Observer) -> Stepper:
+        return self.engine.stepper(start, list(y), settings, observe)
 
     @any_numbers
     def _require_inertia(self, y: Sequence[float]) -> None:

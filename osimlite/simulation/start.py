@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -108,6 +108,34 @@ def _number(value: float, what: str, name: str) -> float:
     return float(value)
 
 
+def columns_of_states(labels: Sequence[str], paths: Iterable[str]) -> dict[str, int]:
+    """Which column has which state, as OpenSim's TableUtilities find it.
+
+    A label is the path of the state, the end of it, or what it was called before OpenSim 4: ``knee``, ``knee_u``,
+    ``soleus.activation``.
+
+    Args:
+        labels: of the columns.
+        paths: of the states.
+
+    Returns:
+        The places of the columns by the paths of those states that have one.
+    """
+    places: dict[str, int] = {}
+    for place, label in enumerate(labels):
+        places.setdefault(label, place)
+    found = {}
+    for path in paths:
+        parts = path.strip("/").split("/")
+        owner, what = parts[-2], parts[-1]
+        old = {"value": owner, "speed": f"{owner}_u"}.get(what, f"{owner}.{what}")
+        ends = ("/".join(parts[k:]) for k in range(len(parts)))
+        column = next((places[label] for label in (path, *ends, old) if label in places), None)
+        if column is not None:
+            found[path] = column
+    return found
+
+
 def state_in(
     path: str | Path, mechanism: Mechanism, names: Collection[str], time: float | None = None
 ) -> dict[str, float]:
@@ -116,20 +144,20 @@ def state_in(
     Args:
         path: of a table of states.
         mechanism: whose states they are.
-        names: paths of all states.
+        names: paths of all states, see :func:`columns_of_states`.
         time: of the row that is taken, the nearest in the file, s; the last one if left out.
 
     Raises:
         DocumentError: it is no table, has no states of the mechanism, or no rows.
     """
     table = read_sto(path)
-    columns = [(place, label) for place, label in enumerate(table.columns) if label in names]
+    columns = columns_of_states(table.columns, names)
     if not columns or not len(table.times):
         what = f"column is a state of '{mechanism.name}', such as '{next(iter(names), '')}'" if not columns else "row"
         raise DocumentError(f"no {what}; give a file of its states", file=str(path))
     row = table.rows[-1 if time is None else int(np.argmin(np.abs(table.times - time)))].tolist()
     turning = {info.path for info in mechanism.coordinates if info.motion_type == "rotational"}
     return {
-        label: float(np.radians(row[place])) if table.in_degrees and label.rpartition("/")[0] in turning else row[place]
-        for place, label in columns
+        path: float(np.radians(row[place])) if table.in_degrees and path.rpartition("/")[0] in turning else row[place]
+        for path, place in columns.items()
     }

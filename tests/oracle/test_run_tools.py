@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import subprocess
 import sys
 from pathlib import Path
@@ -106,3 +107,53 @@ def test_inverse_dynamics(corpus: Any, tmp_path: Path, monkeypatch: pytest.Monke
     model = osimlite.read(real(corpus, "m0001"))
     more = "<forces_to_exclude>Muscles</forces_to_exclude>"
     compare(*both(tmp_path, model, "InverseDynamicsTool", more, cutoff), 1e-8, 1.5e-8)
+
+
+MORE = """<Kinematics name="K"/><BodyKinematics name="B"/>
+    <MuscleAnalysis name="M"><step_interval>3</step_interval></MuscleAnalysis>
+    <ForceReporter name="F"><start_time>0.01</start_time><end_time>0.012</end_time><step_interval>4</step_interval>
+    </ForceReporter>"""
+STARTED = ("arm_init.sto", "start/arm26_states.sto")
+CHANGES: dict[str, list[tuple[str, str]]] = {
+    "longest step": [("size>       1.0", "size> 0.001")],
+    "equilibrium": [("auxiliary_states> false", "auxiliary_states> true"), (" 0.02 ", " 0.1 ")],
+    "start beside the row": [("<initial_time>       0.0", "<initial_time> 0.013"), (" 0.02 ", " 0.1 ")],
+    "no states": [("arm_init.sto", ""), (" 0.02 ", " 0.1 ")],
+    "in the midst": [STARTED, ("<initial_time>       0.0", "<initial_time> 0.0052"), (" 0.02 ", " 0.1 ")],
+    "no controls": [],
+    "analyses": [("<objects/>", f"<objects>{MORE}</objects>")],
+    "known states": [STARTED, ("ForwardTool", "AnalyzeTool"), ("<objects/>", f"<objects>{MORE}</objects>")],
+}
+
+
+@pytest.mark.parametrize("changes", CHANGES.values(), ids=CHANGES)
+def test_forward_with_opensims_steps(shared: Path, tmp_path: Path, changes: list[tuple[str, str]]) -> None:
+    """As many steps, at the same times: rounding grows in steps of muscles out of equilibrium."""
+    case = shared / "oracle" / "tools" / "reference" / "forward_arm26"
+    (tmp_path / "start").mkdir()
+    (tmp_path / "start" / "arm26_states.sto").write_bytes((case / "arm26_states.sto").read_bytes())
+    for file in case.glob("*.gz"):
+        (tmp_path / file.name.removesuffix(".gz")).write_bytes(gzip.decompress(file.read_bytes()))
+    text = (case / "fwd.xml").read_text().replace("> 8 <", "> 16 <")
+    if not changes:
+        start, end = text.index("<ControlSetController"), text.index("</ControlSetController>")
+        text = text[:start] + text[end + len("</ControlSetController>") :]
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    for results in ("ours", "theirs"):
+        (tmp_path / f"{results}.xml").write_text(text.replace(" Results ", results))
+    tool = "AnalyzeTool" if "AnalyzeTool" in text else "ForwardTool"
+    script = f"import opensim; opensim.Logger.setLevelString('Error'); assert opensim.{tool}('theirs.xml').run()"
+    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True, capture_output=True, timeout=100)
+    osimlite.run(tmp_path / "ours.xml")
+    ours, theirs = tmp_path / "ours", tmp_path / "theirs"
+    assert sorted(path.name for path in ours.iterdir()) == sorted(path.name for path in theirs.iterdir())
+    for file in ours.iterdir():
+        heads = [(folder / file.name).read_text().partition("endheader\n")[0] for folder in (ours, theirs)]
+        assert heads[0] == heads[1]
+        mine, known = read_sto(file), read_sto(theirs / file.name)
+        assert mine.columns == known.columns and mine.times == pytest.approx(known.times, abs=1e-6)
+        largest = np.abs(known.rows).max(axis=0)
+        assert (np.abs(mine.rows - known.rows).max(axis=0) <= 2e-5 * largest + 1e-9).all(), file.name
+        assert (np.abs(mine.rows[0] - known.rows[0]) <= 1e-9 * largest + 1e-9).all(), file.name

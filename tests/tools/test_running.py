@@ -103,7 +103,6 @@ def test_an_analysis_that_cannot_be_computed_is_refused_before_anything_is_writt
             "</BodyKinematics><Kinematics",
             "in the frames of bodies",
         ),
-        ("PointKinematics name='P'><step_interval>3</step_interval></PointKinematics><Kinematics", "leaves rows out"),
     ):
         text = SETUP.replace("InverseDynamicsTool", "AnalyzeTool")
         text = text.replace("</coordinates_file>", f"</coordinates_file>{analyses}")

@@ -68,7 +68,9 @@ class KernelEngine(System):
                 names=self.state.names,
                 projected=self.projected,
             )
-        return ControlledSteps(self, t, y, settings.accuracy, observe, settings.integrator)
+        return ControlledSteps(
+            self, t, y, settings.accuracy, observe, settings.integrator, step_bounds=settings.step_bounds
+        )
 
     def projected(self, t: float, y: Sequence[float], tolerance: float) -> list[float] | None:
         """The state (y,) nearest to one where the constraints hold to a tolerance; None if none is near."""

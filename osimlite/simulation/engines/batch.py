@@ -70,7 +70,7 @@ class Batch:
         self._engine, self._kinds, self._levels = engine, kinds, levels
         self._vectors = engine.numbers[None] if vectors is None else vectors
         self._times = np.array(options.report_times, dtype=np.float64)
-        self._settings = options.to, options.accuracy, *engine.counted
+        self._settings = options.to, options.accuracy, *engine.counted, *options.step_bounds
         s, event, program = engine.structure, 3 + size * options.event_states, engine.program
         method = import_module(f"{kernels.__name__}.{LAW_MODULES[options.integrator]}")
         self._method_at = int(s[layout.WORK_SIZE]) + 3 * (pairs + len(kinds))

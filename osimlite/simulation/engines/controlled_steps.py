@@ -11,7 +11,15 @@ from weakref import WeakKeyDictionary
 
 from osimlite.errors import SettingError, SimulationError
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.integrators import DEFAULT_ACCURACY, INITIAL_STEP, INTEGRATORS, MERSON, shortest_step, weight
+from osimlite.simulation.integrators import (
+    DEFAULT_ACCURACY,
+    INITIAL_STEP,
+    INTEGRATORS,
+    MERSON,
+    NO_BOUNDS,
+    shortest_step,
+    weight,
+)
 from osimlite.simulation.kernels import layout, record
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.kernels.states import cubic
@@ -50,6 +58,7 @@ class ControlledSteps(Stepper):
         accuracy: as OpenSim understands it.
         observe: called with (time, state) for each step; of those that a table takes, once somebody wants to know.
         integrator: which of `INTEGRATORS`.
+        step_bounds: shortest and longest step of Merson's method, s.
 
     Attributes:
         attempted: steps tried so far, of which `taken` were accepted.
@@ -65,11 +74,14 @@ class ControlledSteps(Stepper):
         accuracy: float = DEFAULT_ACCURACY,
         observe: Observer | None = None,
         integrator: str = MERSON,
+        *,
+        step_bounds: tuple[float, float] = NO_BOUNDS,
     ) -> None:
         if not 0.0 < accuracy < 1.0:
             raise SettingError(f"The accuracy must lie between 0 and 1; {accuracy} does not.")
         super().__init__(engine.derivative, t, y, observe, engine.state.names)
-        self._engine, self._accuracy, self._integrator, self._next_step = engine, accuracy, integrator, INITIAL_STEP
+        self._engine, self._accuracy, self._integrator, self._step_bounds = engine, accuracy, integrator, step_bounds
+        self._next_step = min(max(INITIAL_STEP, step_bounds[0]), step_bounds[1])
         self._room: Floats | None = None
         self._put_off: list[tuple[Floats, Floats]] = []
         self._seen: tuple[float, list[float], Sequence[float]] = (self.time, self.state, self.derivative)
@@ -133,7 +145,13 @@ class ControlledSteps(Stepper):
         batch = Batch(
             self._engine,
             [self.state],
-            BatchOptions(to=to, accuracy=self._accuracy, integrator=self._integrator, report_times=times),
+            BatchOptions(
+                to=to,
+                accuracy=self._accuracy,
+                integrator=self._integrator,
+                report_times=times,
+                step_bounds=self._step_bounds,
+            ),
             start=self.time,
             next_step=self._next_step,
             most_logged=LOGGED_STEPS,
@@ -179,7 +197,8 @@ class ControlledSteps(Stepper):
         Args:
             errors: of the last step that was tried (y,).
         """
-        t0, y0, h = self.time, self.state, shortest_step(self.time, self.attempted)
+        t0, y0 = self.time, self.state
+        h = max(shortest_step(self.time, self.attempted), self._step_bounds[0])
         f0, size = self._evaluate(t0, y0), len(self._engine.order)
         # It may cease to exist behind this state.
         self._evaluate(t0 + h, [y + h * f for y, f in zip(y0, f0, strict=True)])

@@ -14,7 +14,7 @@ from osimlite.records import dataclass
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.probe import DeclaredProbe
-from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON
+from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, NO_BOUNDS
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import Observer, Stepper
@@ -34,6 +34,7 @@ class Settings:
         route: the way to the accelerations, in the engine's words; "auto" lets it choose.
         show: whether to show the motion in a window while it is computed.
         visuals: what bodies look like there.
+        step_bounds: shortest and longest step (s) of Merson's method; the shortest is taken whatever its error.
     """
 
     accuracy: float = DEFAULT_ACCURACY
@@ -42,6 +43,7 @@ class Settings:
     route: str = "auto"
     show: bool = False
     visuals: Visuals | None = None
+    step_bounds: tuple[float, float] = NO_BOUNDS
 
 
 class Engine(Protocol):

@@ -13,9 +13,11 @@ from osimlite.simulation.kernels.method import (
     EVALUATED,
     HAS_DERIVATIVE,
     LAST_TIME,
+    LONGEST,
     MEMORY,
     NEXT_STEP,
     REACHED,
+    SHORTEST,
 )
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
@@ -33,8 +35,9 @@ def merson(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) ->
     error = inf
     if staged(s, x, w, t0, t1, y0, y1, errors, stages) == OK:
         error = step_error(s, x, w, t1, y0, y1, errors, h, 0)
-    h[NEXT_STEP] = next_step_size(step, error, accuracy, limit < t0 + 0.95 * step)
-    if error <= accuracy:
+    h[NEXT_STEP] = min(max(next_step_size(step, error, accuracy, limit < t0 + 0.95 * step), h[SHORTEST]), h[LONGEST])
+    # The shortest step that is allowed is taken whatever its error, as in Simbody.
+    if error <= accuracy or (step <= h[SHORTEST] and error < inf):
         h[REACHED] = t1
     return OK
 

@@ -7,14 +7,15 @@ needs there (HEAD, STATES), and whether derivatives of the forces too (IS_IMPLIC
 
 from __future__ import annotations
 
-LAST_TIME, ACCEPTED, COUNTED_Q, COUNTED_U = 0, 1, 2, 3
+LAST_TIME, ACCEPTED, COUNTED_Q, COUNTED_U, SHORTEST, LONGEST = 0, 1, 2, 3, 4, 5
 """What does not change: time that may be reached at most (s); what the error of a step may be, and what the sums of the
-squared errors of values and of speeds are divided by, see `error_norm`."""
-REACHED, NEXT_STEP = 4, 5
+squared errors of values and of speeds are divided by, see `error_norm`; bounds of Merson's steps (s), of which the
+shortest is taken whatever its error."""
+REACHED, NEXT_STEP = 6, 7
 """Time (s) at the start of the step, and at its end if it was taken; step to try, and to try next."""
-EVALUATED, HAS_DERIVATIVE = 6, 7
+EVALUATED, HAS_DERIVATIVE = 8, 9
 """How many evaluations it took; whether the derivative at the end was put behind y1."""
-MEMORY = 8
+MEMORY = 10
 """From here on a method keeps what it likes from step to step; it begins anew where the first of that is 0."""
 
 ERRORS = 4

@@ -18,6 +18,7 @@ from osimlite.simulation.kernels.method import (
     MEMORY,
     NEXT_STEP,
     REACHED,
+    SHORTEST,
 )
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.record import (
@@ -179,7 +180,8 @@ def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
 def step(m: Motion, t0: float, y0: Floats, y1: Floats) -> float:
     """Find a step whose error is small enough: y1 and the time of its end; t0 - 1 if there is none, t0 if too many."""
     counts, clock, sizes = m.counts, m.clock, m.sizes
-    h, smallest = at(m.w, sizes[METHOD_AT]), shortest_step(t0, counts[ATTEMPTED])
+    h = at(m.w, sizes[METHOD_AT])
+    smallest = max(shortest_step(t0, counts[ATTEMPTED]), h[SHORTEST])
     h[REACHED], h[NEXT_STEP] = t0, clock[1]
     while counts[ATTEMPTED] < sizes[MOST_TRIES]:
         tried = h[NEXT_STEP]

@@ -1,0 +1,99 @@
+"""OpenSim's ForwardTool: the motion of a model from a state on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from osimlite.multibody.spatial import Array
+from osimlite.schema.tools.dynamics import ForwardTool
+from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.run import Simulation
+from osimlite.tools.job import Job
+from osimlite.tools.motion import Motion
+from osimlite.tools.outcome import Outcome
+from osimlite.tools.through_time import StateRows, analyse, analyses_of, simulation_of, tell_rows, told_model
+
+
+def run(job: Job, outcome: Outcome) -> None:
+    """Follow the motion with OpenSim's steps; write states and controls at the end of each, and the analyses."""
+    setup: ForwardTool = job.setup
+    analyses = analyses_of(job)
+    bounds = setup.minimum_integrator_step_size, setup.maximum_integrator_step_size
+    if not 0.0 < setup.integrator_error_tolerance < 1.0:
+        raise job.error(
+            f"integrator_error_tolerance is {setup.integrator_error_tolerance:g}, with which OpenSim does not end; "
+            "give one between 0 and 1, such as 1e-5"
+        )
+    if not 0.0 <= bounds[0] <= bounds[1] or bounds[1] == 0.0:
+        raise job.error(f"steps from {bounds[0]:g} s to {bounds[1]:g} s are none; give a longest that is longer")
+    model = told_model(job)
+    with simulation_of(job, model) as simulation:
+        start, y = _start(job, outcome, simulation)
+        if not start < setup.final_time:
+            raise job.error(f"the final_time {setup.final_time:g} s does not come after the start at {start:g} s")
+        settings = Settings(setup.integrator_error_tolerance, step_bounds=bounds)
+        times, states, failure = simulation.every_step(start, y, setup.final_time, settings)
+        outcome.done = failure is None
+        if failure is not None:
+            outcome.tell("ended early", failure.message)
+        motion = Motion(model, simulation, np.array(times), np.array(states))
+        _write(job, outcome, motion)
+        analyse(job, outcome, analyses, motion)
+    tell_rows(outcome, times)
+
+
+def _start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[float, list[float]]:
+    """When and how the motion begins: with the row of the states at or before the initial time, at its time."""
+    setup: ForwardTool = job.setup
+    start, path = setup.initial_time, job.path("states_file")
+    if path is None:
+        y = simulation.initial_state({}, {})
+    else:
+        given = StateRows.read(job, path, simulation)
+        given.tell(outcome)
+        row = given.row(start)
+        start, y = float(given.table.times[row]), given.state(simulation, row)
+        if start != setup.initial_time:
+            outcome.tell("start", f"{start:g} s, the time of the states that are taken")
+    if setup.solve_for_equilibrium_for_auxiliary_states:
+        y = simulation.engine.equilibrated(start, y)
+    return start, y
+
+
+def _write(job: Job, outcome: Outcome, motion: Motion) -> None:
+    setup: ForwardTool = job.setup
+    simulation, times, precision = motion.simulation, motion.times, setup.output_precision
+    mechanism, state = motion.mechanism, simulation.state
+    columns = state.auxiliary_histories(motion.states)
+    turning = np.ones(len(simulation.paths))
+    for place, info in enumerate(mechanism.coordinates):
+        for what, history in (("value", motion.values), ("speed", motion.speeds)):
+            path = f"{info.path}/{what}"
+            columns[path] = history[:, place]
+            if info.motion_type == "rotational":
+                turning[simulation.paths.index(path)] = np.degrees(1.0)
+    rows: Array = np.column_stack([columns[path] for path in simulation.paths])
+    name = setup.name
+
+    def add(ending: str, table: StoTable, description: str = "") -> None:
+        outcome.table(job.in_results(f"{name}_{ending}"), table, description, precision)
+
+    paths = tuple(simulation.paths)
+    add("states.sto", StoTable(name, times, paths, rows))
+    simm = f"""
+# SIMM Motion File Header:
+name {name}
+datacolumns {len(paths) + 1}
+datarows {len(times)}
+otherdata 1
+range {times[0]:f} {times[-1]:f}"""
+    add("states_degrees.mot", StoTable(name, times, paths, rows * turning, in_degrees=True), simm)
+    controls = simulation.forces.controls.names
+    if controls:
+        found = []
+        for t, y in motion.moments:
+            motion.system.applied(t, y)
+            found.append(motion.system.controls())
+        labels = tuple(path.rpartition("/")[2] for path in controls)
+        add("controls.sto", StoTable("controls", times, labels, np.array(found)))

@@ -1,0 +1,165 @@
+"""What the tools that take a model through time have in common: the model, states of a file, analyses along the rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from osimlite._load import module_name
+from osimlite.multibody.spatial import Array
+from osimlite.schema.base import Object
+from osimlite.schema.forces import ForceSet
+from osimlite.schema.model import Model
+from osimlite.schema.specs import file_specs
+from osimlite.schema.tools.dynamics import AbstractTool
+from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.simulation.run import Simulation
+from osimlite.simulation.start import columns_of_states, starting
+from osimlite.text import listed
+from osimlite.tools.job import Job
+from osimlite.tools.motion import Motion, Tables
+from osimlite.tools.not_runnable import NotRunnable
+from osimlite.tools.outcome import Outcome
+
+_ANALYSES = "osimlite.tools.analyses"
+
+Analyses = list[tuple[Any, ModuleType]]
+"""Analyses of a setup, and the modules that compute them."""
+
+
+def analyses_of(job: Job) -> Analyses:
+    """The analyses that are on.
+
+    Raises:
+        NotRunnable: there is no module for one.
+    """
+    setup: AbstractTool = job.setup
+    found = []
+    for item in setup.analysis_set.objects:
+        if item.on:
+            tag = type(item).__name__
+            name = f"{_ANALYSES}.{module_name(tag)}"
+            if find_spec(name) is None:
+                told = f"the analysis '{item.name}' is a {tag}, which cannot be computed yet"
+                raise NotRunnable(told, file=str(job.file))
+            found.append((item, import_module(name)))
+    return found
+
+
+def analyse(job: Job, outcome: Outcome, analyses: Analyses, motion: Motion, first: int = 0) -> None:
+    """Compute analyses along the rows of a motion.
+
+    As in OpenSim, the first and the last row are always among those of an analysis, and between them those whose number
+    is a multiple of its `step_interval`; its `start_time` and `end_time` mean nothing.
+
+    Args:
+        job: what is done.
+        outcome: that has the tables written.
+        analyses: what is computed.
+        motion: all rows.
+        first: number of the first row.
+    """
+    numbers = np.arange(first, first + len(motion.times))
+    for item, module in analyses:
+        own = motion
+        if item.step_interval > 1:
+            chosen = numbers % item.step_interval == 0
+            chosen[[0, -1]] = True
+            own = Motion(motion.model, motion.simulation, motion.times[chosen], motion.states[chosen])
+        module.compute(item, own, Tables(job, outcome, item.name, own.times))
+
+
+def told_model(job: Job) -> Model:
+    """The model of a setup with the forces and controllers that the setup gives it."""
+    setup: AbstractTool = job.setup
+    model = job.model()
+    if setup.replace_force_set:
+        model.force_set.objects.clear()
+    for name in setup.force_set_files:
+        path = job.place(name)
+        if path is not None:
+            for force in list(job.read(path, ForceSet).objects):
+                model.force_set.objects.append(force)
+    for controller in setup.controller_set.objects:
+        model.controller_set.objects.append(_from_here(job, controller.copy_deep()))
+    return model
+
+
+def _from_here(job: Job, item: Object) -> Any:
+    """An object of the setup whose files are looked for from the folder of the setup, wherever the model is."""
+    for part in item.walk():
+        for spec in file_specs(type(part), "file"):
+            path = job.place(str(getattr(part, spec.name)))
+            if path is not None:
+                setattr(part, spec.name, str(path.absolute()))
+    return item
+
+
+def simulation_of(job: Job, model: Model) -> Simulation:
+    """What computes the model of a setup under its loads."""
+    loads = job.path("external_loads_file")
+    return Simulation(model, "compiled", external_loads=loads, folder=job.needed("model_file").parent)
+
+
+class StateRows(NamedTuple):
+    """States of a file.
+
+    Attributes:
+        table: the file.
+        columns: places of the columns by the paths of the states.
+        missing: paths of the states that have no column.
+    """
+
+    table: StoTable
+    columns: dict[str, int]
+    missing: tuple[str, ...]
+
+    @classmethod
+    def read(cls, job: Job, path: Path, simulation: Simulation) -> StateRows:
+        """States of the model of a simulation.
+
+        Raises:
+            DocumentError: the file has no states of the model, or no rows, or is in degrees.
+        """
+        table = read_sto(path)
+        columns = columns_of_states(table.columns, simulation.paths)
+        if table.in_degrees:
+            raise job.error(f"'{path}' is in degrees, which OpenSim refuses for states; give it in radians")
+        if not columns or not len(table.times):
+            raise job.error(f"'{path}' has no {'rows' if columns else 'column with a state of the model'}")
+        return cls(table, columns, tuple(path for path in simulation.paths if path not in columns))
+
+    def row(self, time: float) -> int:
+        """The number of the row at or before a time, s; the first if there is none."""
+        return max(0, int(np.searchsorted(self.table.times, time, side="right")) - 1)
+
+    def state(self, simulation: Simulation, row: int) -> list[float]:
+        """The state of a row in the order of the engine; what has no column is as in the default state."""
+        given = {path: float(self.table.rows[row, place]) for path, place in self.columns.items()}
+        own = [path for path in simulation.state.paths if path in given]
+        moving = {path: value for path, value in given.items() if path not in own}
+        q, u, _ = starting(simulation.mechanism, moving, {})
+        if simulation.constraints:
+            q = simulation.mechanism.assemble(q, float(self.table.times[row])).tolist()
+        y = simulation.state.pack(q, u)
+        first = 2 * len(simulation.state.order)
+        for path in own:
+            y[first + simulation.state.paths.index(path)] = given[path]
+        return y
+
+    def tell(self, outcome: Outcome) -> None:
+        """Say which states were not in the file."""
+        if self.missing:
+            outcome.tell("not in the file", f"{listed(self.missing)}: the default values are taken")
+
+
+def tell_rows(outcome: Outcome, times: Array | Sequence[float]) -> None:
+    """Say how many rows there are."""
+    outcome.tell("rows", f"{len(times)}, from {times[0]:g} s to {times[-1]:g} s")
+    outcome.summary["rows"] = len(times)
