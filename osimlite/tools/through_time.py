@@ -1,4 +1,4 @@
-"""What the tools that take a model through time have in common: the model, states of a file, analyses along the rows."""
+"""What the tools that take a model through time share: the model, states of a file, analyses along the rows."""
 
 from __future__ import annotations
 
