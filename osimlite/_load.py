@@ -45,8 +45,8 @@ def module_of_file(path: Path) -> ModuleType:
 
 
 def module_name(name: str) -> str:
-    """The module that declares what osimlite makes of a class: PathSpring is in path_spring."""
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+    """The module of what osimlite makes of a class: PathSpring is in path_spring, IMUPlacer in imu_placer."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
 
 
 def module_named(name: str) -> ModuleType:

@@ -10,7 +10,7 @@ import numpy as np
 
 from osimlite.errors import SettingError
 from osimlite.fitting.inverse_kinematics import ADVICE, FittedMotion, fitted, marker_stations
-from osimlite.fitting.marker_data import MarkerData, common
+from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.pose_layout import Goal
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
@@ -61,7 +61,7 @@ def tasks_of(
         if not 0.0 <= task.weight < np.inf:
             raise SettingError(f"the weight {task.weight:g} of the task '{task.name}' is no weight; give one from 0 on")
     asked = {task.name: float(task.weight) for task in applied if isinstance(task, IKMarkerTask)} or None
-    names = common([*marker_stations(model, mechanism)], data, asked)
+    names = data.shared([*marker_stations(model, mechanism)], asked)
     weights = {name: 1.0 if asked is None else asked[name] for name in names}
     goals, wanted = [], []
     for task in applied:

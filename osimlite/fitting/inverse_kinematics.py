@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.errors import SettingError
-from osimlite.fitting.marker_data import MarkerData, Measured, common
+from osimlite.fitting.marker_data import MarkerData, Measured
 from osimlite.fitting.pose_fit import PoseFit, Poses
 from osimlite.fitting.pose_layout import Goal, Marker
 from osimlite.multibody import build_mechanism
@@ -160,7 +160,7 @@ def inverse_kinematics(
     data = MarkerData.of(markers, times).between(start, end)
     mechanism = build_mechanism(model)
     stations = marker_stations(model, mechanism)
-    names = common([*stations], data)
+    names = data.shared([*stations])
     weighed = {name: 1.0 for name in names}
     for name, weight in (weights or {}).items():
         if name not in stations:

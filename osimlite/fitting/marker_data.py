@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -10,49 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite.errors import DocumentError, MissingDependency, OsimliteError, SettingError
+from osimlite.errors import DocumentError, MissingDependency
 from osimlite.files import read_file
+from osimlite.fitting.recorded import Recording
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.simulation.files.storage import read_sto
 from osimlite.tables import METRES, MarkerHeader
-from osimlite.text import did_you_mean, listed
 
 
 @dataclass(frozen=True, eq=False)
-class MarkerData:
-    """Places of m markers at t times.
+class MarkerData(Recording):
+    """Places of m markers in ground at t times (t, m, 3), m; NaN where a marker was not seen."""
 
-    Attributes:
-        names: of the markers (m,).
-        times: (t,), s.
-        positions: in ground (t, m, 3), m; NaN where a marker was not seen.
-        file: where they were read from.
-    """
-
-    names: tuple[str, ...]
-    times: Array
-    positions: Array
-    file: str | None = None
-
-    def __post_init__(self) -> None:
-        twice = sorted({name for name in self.names if self.names.count(name) > 1})
-        if twice:
-            raise DocumentError(f"two markers are called {listed(twice)}; rename one of each", file=self.file)
-        if len(self.times) == 0:
-            raise DocumentError("there are markers but no frames", file=self.file)
-        if self.positions.shape != (len(self.times), len(self.names), 3):
-            raise SettingError(
-                f"the positions of {len(self.names)} markers at {len(self.times)} times are an array of that many "
-                f"times, markers and 3 numbers; got {' × '.join(map(str, self.positions.shape))}"
-            )
-        steps = np.diff(self.times)
-        if not (steps > 0.0).all() or not np.isfinite(self.times).all():
-            frame = int(np.argmin(steps > 0.0)) + 2 if len(steps) else 1
-            raise DocumentError(
-                f"the times of the frames must increase, and frame {frame} does not come after the one before it",
-                file=self.file,
-            )
+    noun, shape = "marker", (3,)
 
     @classmethod
     def of(cls, source: Measured, times: ArrayLike | None = None) -> MarkerData:
@@ -72,13 +43,12 @@ class MarkerData:
             return source
         if isinstance(source, str | Path):
             return _READERS.get(Path(source).suffix.lower(), read_trc)(source)
-        arrays = {name: np.atleast_2d(np.asarray(value, dtype=float)) for name, value in source.items()}
-        counts = {array.shape for array in arrays.values()}
-        if len(counts) != 1 or next(iter(counts))[1:] != (3,):
-            raise SettingError("every marker has one row of three numbers for each frame, as many as all others")
-        (count, _), *_ = counts
-        moments = np.arange(count, dtype=float) if times is None else np.asarray(times, dtype=float).reshape(-1)
-        return cls(tuple(arrays), moments, np.stack([*arrays.values()], axis=1))
+        return cls.of_arrays(source, times)
+
+    @property
+    def positions(self) -> Array:
+        """The places (t, m, 3), m."""
+        return self.values
 
     def between(self, first: float, last: float) -> MarkerData:
         """The frames from the one nearest to a time to the one nearest to another, both cut to the data.
@@ -88,26 +58,9 @@ class MarkerData:
         """
         low, high = max(first, float(self.times[0])), min(last, float(self.times[-1]))
         if not low <= high:
-            where = f" of '{self.file}'" if self.file else ""
-            raise SettingError(
-                f"no frame{where} lies between {first:g} and {last:g} s; the data are from {self.times[0]:g} to "
-                f"{self.times[-1]:g} s"
-            )
+            raise self.none_between(first, last)
         start, end = (int(np.argmin(np.abs(self.times - t))) for t in (low, high))
-        return MarkerData(self.names, self.times[start : end + 1], self.positions[start : end + 1], self.file)
-
-    def only(self, names: Sequence[str]) -> Array:
-        """The positions (t, k, 3) of some markers.
-
-        Raises:
-            SettingError: there is no such marker.
-        """
-        places = {name: place for place, name in enumerate(self.names)}
-        for name in names:
-            if name not in places:
-                where = f"'{self.file}'" if self.file else "the data"
-                raise SettingError(f"{where} has no marker '{name}'{did_you_mean(name, self.names)}")
-        return self.positions[:, [places[name] for name in names]]
+        return self.rows(start, end + 1)
 
 
 def read_trc(path: str | Path) -> MarkerData:
@@ -200,27 +153,6 @@ def read_c3d(path: str | Path) -> MarkerData:
     rate, first = found["header"]["points"]["frame_rate"], found["header"]["points"]["first_frame"]
     times = (first + np.arange(len(positions))) / rate
     return MarkerData(names[: positions.shape[1]], times, unit * positions, str(path))
-
-
-def common(model: Sequence[str], data: MarkerData, chosen: Mapping[str, float] | None = None) -> list[str]:
-    """Names of the markers that a model and data share, in the order of the data.
-
-    Args:
-        model: names of the markers of the model.
-        data: what was measured.
-        chosen: only of these, if given.
-
-    Raises:
-        OsimliteError: there are none.
-    """
-    names = [name for name in data.names if name in model and (chosen is None or name in chosen)]
-    if not names:
-        where = f"'{data.file}'" if data.file else "the data"
-        raise OsimliteError(
-            f"no marker of {where} ({listed([*data.names])}) is one of the model ({listed([*model])}); "
-            "give the markers of the model the names of the data"
-        )
-    return names
 
 
 Measured = MarkerData | str | Path | Mapping[str, ArrayLike]

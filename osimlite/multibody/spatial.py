@@ -56,6 +56,11 @@ def rotation_xyz(angles: Array) -> Array:
     )
 
 
+def rotation_about_space(angles: ArrayLike) -> Array:
+    """Rotation matrix Rz(c) Ry(b) Rx(a) of `angles` (3,) about X, Y and Z of space, one after the other (rad)."""
+    return rotation_xyz(-np.asarray(angles, dtype=float)).T
+
+
 def angles_xyz(rotation: Array) -> Array:
     """Body-fixed X-Y-Z angles (3,) of a rotation matrix, the second from -90 to 90 degrees (rad)."""
     (r11, r12, r13), (r21, r22, r23), (_, _, r33) = rotation.tolist()
@@ -80,6 +85,21 @@ def quaternion(rotation: ArrayLike) -> Array:
     rows: Array = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
     rows /= np.linalg.norm(rows, axis=-1, keepdims=True)
     return rows
+
+
+def rotation_of(quaternions: ArrayLike) -> Array:
+    """Rotation matrices (..., 3, 3) of quaternions (..., 4), scalar first, whatever their lengths; NaN for zeros."""
+    given = np.asarray(quaternions, dtype=float)
+    with np.errstate(invalid="ignore"):
+        w, x, y, z = np.moveaxis(given / np.linalg.norm(given, axis=-1, keepdims=True), -1, 0)
+    return np.stack(
+        (
+            np.stack((w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)), -1),
+            np.stack((2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)), -1),
+            np.stack((2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z), -1),
+        ),
+        -2,
+    )
 
 
 def transform(rotation: Any = None, translation: Any = None) -> Array:

@@ -58,7 +58,7 @@ def run(setup: str | Path, output: str | Path | None = None, *, check: bool = Tr
     file = Path(setup)
     top = read_any(file)
     tag = type(top).__name__
-    if tag not in runnable():
+    if not _is_there(tag):
         raise NotRunnable(f"setups of {tag} cannot be run; those of {listed(runnable())} can", file=str(file))
     if check and (report := merged(_reports(str(file)))).errors:
         raise FaultySetup(report)
@@ -71,11 +71,13 @@ def run(setup: str | Path, output: str | Path | None = None, *, check: bool = Tr
 
 def runnable() -> list[str]:
     """The names of the classes whose setups can be run."""
-    return [tag for tag in MODULES if tag.endswith("Tool") and _is_there(tag)]
+    return [tag for tag in MODULES if _is_there(tag)]
 
 
 def _is_there(tag: str) -> bool:
-    return find_spec(f"{__package__}.{module_name(tag)}") is not None
+    """Whether a class is one of tools, and has a module here."""
+    of_tools = MODULES.get(tag, "").startswith("osimlite.schema.tools.")
+    return of_tools and find_spec(f"{__package__}.{module_name(tag)}") is not None
 
 
 def _reports(file: str, passed: frozenset[str] = frozenset()) -> Iterator[Report]:

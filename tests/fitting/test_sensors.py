@@ -1,0 +1,127 @@
+"""Orientations of sensors: reading them, putting sensors onto a model, and what is told where something is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.errors import DocumentError, OsimliteError, SettingError
+from osimlite.fitting.orientation_data import OrientationData
+from osimlite.fitting.sensors import place_sensors
+from osimlite.multibody.spatial import quaternion, rotation_about_space, rotation_of, rotation_xyz
+from osimlite.simulation.files.storage import write_sto
+from tests.cli.command import run
+
+PLACER = """<OpenSimDocument Version="40600">
+    <IMUPlacer>
+        <model_file>leg.osim</model_file>
+        <base_imu_label>{base}</base_imu_label>
+        <base_heading_axis>x</base_heading_axis>
+        <orientation_file_for_calibration>standing.sto</orientation_file_for_calibration>
+        <output_model_file>worn.osim</output_model_file>
+    </IMUPlacer>
+</OpenSimDocument>
+"""
+
+
+def leg() -> osimlite.Model:
+    """A thigh and a shank."""
+    model = osimlite.Model(name="leg")
+    carrier: Any = model.ground
+    for name, joint in (("thigh", osimlite.FreeJoint), ("shank", osimlite.PinJoint)):
+        body = osimlite.Body(name=name, mass=1.0, mass_center=(0.0, -0.2, 0.0), inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+        model.add(body)
+        at = model.add(osimlite.PhysicalOffsetFrame(name=f"{name}_at", socket_parent=carrier))
+        model.add(joint(name=f"{name}_joint", socket_parent_frame=at, socket_child_frame=body))
+        carrier = body
+    return model
+
+
+def turned(*angles: float) -> Any:
+    """A rotation matrix."""
+    return rotation_xyz(np.array(angles))
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Path:
+    """A model, the setup of a placer, and the orientations of a subject that stands."""
+    osimlite.write(leg(), tmp_path / "leg.osim")
+    rows = [[*quaternion(turned(0.1, 0.5, 0.2)), *quaternion(turned(0.0, 0.5, 0.0))]]
+    write_sto(tmp_path / "standing.sto", "s", [0.0], ["thigh_imu", "shank_imu"], np.array(rows).reshape(1, -1),
+              kind="Quaternion")  # fmt: skip
+    (tmp_path / "placer.xml").write_text(PLACER.format(base="thigh_imu"))
+    return tmp_path
+
+
+def test_quaternions_and_matrices_are_the_same_rotations() -> None:
+    given = np.random.default_rng(1).normal(size=(30, 4))
+    matrices = rotation_of(given)
+    assert np.linalg.det(matrices) == pytest.approx(np.ones(30))
+    unit = given / np.linalg.norm(given, axis=1)[:, None]
+    assert np.abs(np.sum(quaternion(matrices) * unit, axis=1)) == pytest.approx(np.ones(30), abs=1e-14)
+    assert rotation_about_space((0.3, 0.4, 0.5)) == pytest.approx(
+        turned(0.0, 0.0, 0.5) @ turned(0.0, 0.4, 0.0) @ turned(0.3, 0.0, 0.0)
+    )
+    for values in (given, matrices):
+        data = OrientationData.of({"thigh_imu": values}, times=np.arange(30) / 10)
+        assert data.values[:, 0] == pytest.approx(matrices)
+        assert data.between(0.95, 2.0).times == pytest.approx(np.arange(10, 21) / 10)
+    assert np.isnan(OrientationData.of({"one": np.zeros(4)}).values).all()
+
+
+def test_sensors_are_worn_in_the_centres_of_mass(lab: Path) -> None:
+    done = run("run", "placer.xml", "-o", "out", folder=lab)
+    assert (done.code, done.err) == (0, "") and "thigh_imu and shank_imu" in done.out and "heading" in done.out
+    model: Any = osimlite.read(lab / "out" / "worn.osim")
+    for name in ("thigh", "shank"):
+        frame, sensor = model[f"/bodyset/{name}/{name}_imu"], model[f"/componentset/{name}_imu"]
+        assert frame.translation == (0.0, -0.2, 0.0) and sensor.socket_frame == frame.path
+    one, other = (turned(*model[f"/bodyset/{name}/{name}_imu"].orientation) for name in ("thigh", "shank"))
+    assert one.T @ other == pytest.approx(turned(0.1, 0.5, 0.2).T @ turned(0.0, 0.5, 0.0))
+
+
+def test_a_sensor_that_is_there_is_turned() -> None:
+    model: Any = leg()
+    place_sensors(model, OrientationData.of({"shank_imu": turned(0.1, 0.2, 0.3), "shank": np.eye(3)}))
+    frame = model["/bodyset/shank/shank_imu"]
+    frame.translation = (1.0, 2.0, 3.0)
+    placed = place_sensors(model, OrientationData.of({"shank_imu": turned(0.3, 0.2, 0.1), "shank": np.eye(3)}))
+    assert placed == (("shank_imu",), ("shank",), None)
+    assert frame.orientation == pytest.approx((0.3, 0.2, 0.1)) and frame.translation == (1.0, 2.0, 3.0)
+    assert len(list(model.components(osimlite.IMU))) == 1
+
+
+def test_a_misspelt_sensor_is_told_with_its_line_and_nothing_is_written(lab: Path) -> None:
+    (lab / "placer.xml").write_text(PLACER.format(base="tigh_imu"))
+    done = run("run", "placer.xml", folder=lab)
+    assert done.code == 2 and "placer.xml:4:" in done.err and "'thigh_imu'" in done.err
+    assert not (lab / "worn.osim").exists()
+
+
+def test_what_is_wrong_with_sensors_is_told(lab: Path) -> None:
+    eye = np.eye(3)
+    for data, words, said in (
+        ({"thigh_imu": eye}, ("shank_imu", "x"), "there is no sensor 'shank_imu' in the data"),
+        ({"thigh_imu": eye}, ("thigh_imu", "w"), "the axis 'w' is none"),
+        ({"foot_imu": eye, "thigh": eye}, (), r"no sensor of the data \(foot_imu and thigh\) is called as a frame"),
+        ({"thigh_imu": np.full((3, 3), np.nan)}, (), "does not say in its first frame how the sensor 'thigh_imu'"),
+    ):
+        with pytest.raises(SettingError, match=said):
+            place_sensors(leg(), OrientationData.of(data), *words)
+    with pytest.raises(SettingError, match="quaternions of 4 numbers or matrices"):
+        OrientationData.of({"thigh_imu": np.zeros((5, 3))})
+    with pytest.raises(SettingError, match="as many as all others"):
+        OrientationData.of({"one": np.zeros((5, 4)), "two": np.zeros((4, 4))})
+    with pytest.raises(OsimliteError, match="no frame of"):
+        OrientationData.of(lab / "standing.sto").between(1.0, 2.0)
+    write_sto(lab / "motion.sto", "m", [0.0], ["a"], [[1.0]])
+    with pytest.raises(DocumentError, match="must say DataType=Quaternion"):
+        OrientationData.of(lab / "motion.sto")
+    twins: Any = leg()
+    twins["/bodyset/thigh"].components.append(osimlite.PhysicalOffsetFrame(name="shank", socket_parent=".."))
+    with pytest.raises(SettingError, match="several frames 'shank'"):
+        place_sensors(twins, OrientationData.of({"shank_imu": eye}))
