@@ -41,6 +41,7 @@ class System:
         forces: what pushes it, besides gravity.
         chain: of joints whose mass matrix another program computes; the kernels do without one.
         code: what runs the kernels; the best that is installed if left out.
+        apart: whether every body is a link of its own, also one that never moves in another.
 
     Attributes:
         structure: what is connected to what, integers; equal for models that differ in numbers only.
@@ -63,9 +64,15 @@ class System:
     """Names of the functions of the kernels that it calls."""
 
     def __init__(
-        self, mechanism: Mechanism, forces: Forces, chain: Chain | None = None, code: Code | None = None
+        self,
+        mechanism: Mechanism,
+        forces: Forces,
+        chain: Chain | None = None,
+        code: Code | None = None,
+        *,
+        apart: bool = False,
     ) -> None:
-        packed = pack(mechanism, forces, chain)
+        packed = pack(mechanism, forces, chain, apart=apart)
         self.structure, self.placements, self.order = packed.structure, packed.placements, packed.order
         contacts = [element for element in forces.elements if isinstance(element, PairContact)]
         self.contacts = tuple(item.pair_name(place) for item in contacts for place in range(len(item.pairs)))
@@ -177,6 +184,15 @@ class System:
         if status != layout.OK:
             raise self.refusal(status, t, y)
         return self._f[count : 2 * count].tolist()
+
+    def links_in_motion(self, t: float, y: Sequence[float], udot: Sequence[float]) -> Floats:
+        """What the kernels find of all links (l, n) that accelerate so.
+
+        The wrench of each is what pushes it and all that it carries, gravity too, less what accelerates them: joints
+        and constraints make up for it. Errors are those of :meth:`missing`.
+        """
+        self.missing(t, y, udot)
+        return self._links.copy()
 
     def equilibrated(self, t: float, y: Sequence[float], numbers: Floats | None = None) -> list[float]:
         """A state (y,) with the auxiliary states that have an equilibrium in it, as Model::equilibrateMuscles gives it.

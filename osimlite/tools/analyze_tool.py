@@ -52,11 +52,12 @@ def _followed(job: Job, simulation: Simulation) -> tuple[int, Iterator[tuple[flo
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:
         recorded = recorded.lowpassed(cutoff, continued=True)
-    if simulation.constraints:
-        recorded = recorded.assembled()
     before = recorded.times
     recorded = recorded.between(setup.initial_time, setup.final_time)
-    # OpenSim takes the rates of coordinates for the speeds.
-    rows = zip(recorded.times.tolist(), recorded.values, recorded.rates[0], strict=True)
+    # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints change the values.
+    speeds = recorded.rates[0]
+    if simulation.constraints:
+        recorded = recorded.assembled()
+    rows = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
     first = int(np.searchsorted(before, recorded.times[0]))
     return first, ((t, simulation.state.pack(q.tolist(), u.tolist())) for t, q, u in rows)

@@ -62,6 +62,11 @@ def both(folder: Path, model: Model, tool: str, more: str, cutoff: float = -1.0)
     mechanism = osimlite.mechanism(model)
     times = np.linspace(0.0, 0.5, 26)
     rows = np.array([info.default_value + 0.15 * np.sin(5 * times + k) for k, info in enumerate(mechanism.coordinates)])
+    if mechanism.constraints:
+        # Where constraints are to be fulfilled, OpenSim moves coordinates by 1e-5 rad off the ends of their ranges.
+        ranges = [(low + 0.1, high - 0.1) for low, high in (info.range for info in mechanism.coordinates)]
+        rows = np.array([np.clip(row, *ends) for row, ends in zip(rows, ranges, strict=True)])
+        rows = np.array([mechanism.assemble(q) for q in rows.T]).T
     turns = [info.motion_type == "rotational" for info in mechanism.coordinates]
     write_sto(
         folder / "motion.mot", "motion", times, mechanism.coordinate_names,

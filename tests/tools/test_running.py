@@ -97,7 +97,6 @@ def test_an_analysis_that_cannot_be_computed_is_refused_before_anything_is_writt
     analyses = "<AnalysisSet><objects><Kinematics name='K'/><{}/></objects></AnalysisSet>"
     for analysis, said in (
         ("StaticOptimization name='SO'", "'SO' is a StaticOptimization"),
-        ("JointReaction name='JR'", "'JR' is a JointReaction"),
         (
             "BodyKinematics name='B'><express_results_in_body_local_frame>true</express_results_in_body_local_frame>"
             "</BodyKinematics><Kinematics",

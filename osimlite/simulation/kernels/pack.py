@@ -88,13 +88,14 @@ class _Link:
     second: Array = field(default_factory=lambda: np.zeros((3, 3)))  # inertia about the link's origin
 
 
-def pack(mechanism: Mechanism, forces: Forces, chain: Chain | None = None) -> Packed:
+def pack(mechanism: Mechanism, forces: Forces, chain: Chain | None = None, *, apart: bool = False) -> Packed:
     """Pack a mechanism and its forces.
 
     Args:
         mechanism: what moves.
         forces: what pushes it, besides gravity.
         chain: of joints whose mass matrix another program computes; the kernels do without one.
+        apart: whether bodies that never move in one another are links of their own.
 
     Raises:
         UnsupportedError: a joint, a function, a constraint or a force that the kernels do not know.
@@ -105,7 +106,7 @@ def pack(mechanism: Mechanism, forces: Forces, chain: Chain | None = None) -> Pa
     for body in mechanism.bodies:
         parent, frame = (GROUND, np.eye(4)) if body.parent == GROUND else placements[body.parent]
         operations, rest = _operations(mechanism, body.mobilizer, frame, free)
-        if operations:
+        if operations or apart:
             links.append(_Link(parent, operations))
             parent = len(links) - 1
         placements.append(Placement(parent, rest))

@@ -1,0 +1,201 @@
+"""The JointReaction analysis: what each joint carries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from osimlite.multibody.parts import GROUND
+from osimlite.multibody.schema_frames import Placements
+from osimlite.multibody.spatial import Array
+from osimlite.schema.actuators import (
+    CoordinateActuator,
+    PointActuator,
+    PointToPointActuator,
+    ScalarActuator,
+    TorqueActuator,
+)
+from osimlite.schema.joints import Joint
+from osimlite.schema.model import Model
+from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.tools.analyses import JointReaction
+from osimlite.simulation.elements.controls import Controls
+from osimlite.simulation.files.storage import read_sto
+from osimlite.simulation.given_controls import driven
+from osimlite.simulation.kernels import layout
+from osimlite.simulation.run import Simulation
+from osimlite.simulation.system import System
+from osimlite.text import counted, did_you_mean, listed
+from osimlite.tools.motion import Motion, Tables
+from osimlite.tools.not_runnable import NotRunnable
+
+_TITLE = "Joint Reaction Loads"
+_DESCRIPTION = (
+    "\nThis file contains the reaction forces and moments\n"
+    "applied to the specified body of a joint pair and expressed  in the specified reference frame.\n"
+    "\nUnits are S.I. units (seconds, meters, Newtons, ...)"
+)
+_ENDINGS = ("fx", "fy", "fz", "mx", "my", "mz", "px", "py", "pz")
+
+
+def compute(analysis: JointReaction, motion: Motion, tables: Tables) -> None:
+    """Write the force (N), the moment (N m) and the point (m) at which they act of every joint that is asked for."""
+    mechanism, model = motion.mechanism, motion.model
+    joints = _joints(analysis, model, tables)
+    sides = _of_each("apply_on_bodies", analysis.apply_on_bodies or ("child",), joints, tables)
+    frames = _of_each("express_in_frame", analysis.express_in_frame or ("ground",), joints, tables)
+    if mechanism.constrained:
+        names = listed(mechanism.bodies[body].name for body in sorted(mechanism.constrained))
+        told = f"'{analysis.name}' asks for reactions while constraints act on {names}, which is not done yet"
+        raise NotRunnable(told, file=str(tables.job.file))
+    loads = _Loads(*_overridden(analysis, motion, tables))
+    columns: list[str] = []
+    rows: list[Array] = []
+    for joint, word, asked in zip(joints, sides, frames, strict=True):
+        side = word.lower()
+        if side not in ("child", "parent"):
+            raise tables.job.error(f"apply_on_bodies has '{side}'; it says child or parent")
+        bases = {end: _base(model, joint, end) for end in ("child", "parent")}
+        frame = _frame(model, asked, bases, tables)
+        force, moment, place = loads.of(joint, side)
+        rotation, origin = loads.placed(*mechanism.placement(frame))
+        back = rotation.transpose(0, 2, 1)
+        rows += [(back @ item[..., None])[..., 0] for item in (force, moment, place - origin)]
+        root = f"{joint.name}_on_{_last(bases[side])}_in_{_last(frame)}"
+        columns += [f"{root}_{ending}" for ending in _ENDINGS]
+    tables.add("ReactionLoads", _TITLE, columns, np.concatenate(rows, axis=1), description=_DESCRIPTION)
+
+
+def _joints(analysis: JointReaction, model: Model, tables: Tables) -> list[Joint]:
+    """The joints that are asked for; OpenSim finds each after the one before only, and leaves the others out."""
+    every = model.joint_set.objects
+    names = list(map(str, analysis.joint_names)) or ["ALL"]
+    if names[0].upper() == "ALL":
+        return list(every)
+    known = {joint.name: joint for joint in every}
+    for name in names:
+        if name not in known:
+            raise tables.job.error(f"there is no joint '{name}' for '{analysis.name}'{did_you_mean(name, known)}")
+    return [known[name] for name in names]
+
+
+def _of_each(what: str, given: Sequence[object], joints: Sequence[Joint], tables: Tables) -> list[str]:
+    """The word for each joint; one may be for all."""
+    words = list(map(str, given))
+    if len(words) == 1:
+        return words * len(joints)
+    if len(words) != len(joints):
+        count = counted(len(joints), "joint")
+        raise tables.job.error(f"{what} has {len(words)} words for {count}; give one, or as many")
+    return words
+
+
+def _base(model: Model, joint: Joint, end: str) -> str:
+    """The path of the body (or ground) that an end of a joint is fixed to."""
+    placements = Placements(model.tree())
+    return placements.frame(placements.named(joint, f"socket_{end}_frame"))[0]
+
+
+def _frame(model: Model, asked: str, bases: dict[str, str], tables: Tables) -> str:
+    """The path of a frame that is asked for by a word or as OpenSim finds it: in the model, its bodies, its joints."""
+    tree = model.tree()
+    for base in ("", "/bodyset", "/jointset"):
+        found = tree.walk(asked, base, "Frame").target
+        if found is not None:
+            return tree.path_of(found) or ""
+    if asked.lower() in bases:
+        return bases[asked.lower()]
+    raise tables.job.error(
+        f"express_in_frame has '{asked}', which is no frame of the model; say child, parent or a frame"
+    )
+
+
+def _last(path: str) -> str:
+    return path.rpartition("/")[2]
+
+
+def _overridden(analysis: JointReaction, motion: Motion, tables: Tables) -> tuple[Motion, Controls | None]:
+    """The motion of a model whose actuators push as a file says, and what drives them.
+
+    OpenSim does so if every actuator has a column; else it takes the forces of the states.
+    """
+    path = tables.job.place(analysis.forces_file)
+    if path is None:
+        return motion, None
+    table = read_sto(path)
+    model = motion.model.copy_deep()
+    actuators = [item for item in model.components(ScalarActuator)]
+    lacking = [item.name for item in actuators if item.name not in table.columns]
+    if lacking:
+        tables.outcome.tell(
+            analysis.name,
+            f"'{path}' has no column for {listed(lacking)}: the forces are those of the states, as in OpenSim",
+        )
+        return motion, None
+    model.controller_set.objects.clear()
+    places = {id(force): number for number, force in enumerate(model.force_set.objects)}
+    for item in actuators:
+        ideal = _ideal(item)
+        if ideal is None or id(item) not in places:
+            told = f"the {type(item).__name__} '{item.name}' cannot push as '{path}' says, which is not done yet"
+            raise NotRunnable(told, file=str(tables.job.file))
+        model.force_set.objects[places[id(item)]] = ideal
+    job = tables.job
+    simulation = Simulation(
+        model, "compiled", external_loads=job.path("external_loads_file"), folder=job.needed("model_file").parent
+    )
+    forces = {item.name: (table.times, table[item.name]) for item in actuators}
+    controls = driven(simulation.forces.controls, forces, float(motion.times[-1]))
+    simulation.engine.drive(controls)
+    pairs = zip(motion.values.tolist(), motion.speeds.tolist(), strict=True)
+    return Motion(model, simulation, motion.times, np.array([simulation.state.pack(q, u) for q, u in pairs])), controls
+
+
+def _ideal(actuator: ScalarActuator) -> ScalarActuator | None:
+    """An actuator in the place of another one that pushes with its control."""
+    if isinstance(actuator, PathActuator):
+        path = actuator.geometry_path.copy_deep()
+        return PathActuator(name=actuator.name, appliesForce=actuator.appliesForce, geometry_path=path)
+    if not isinstance(actuator, CoordinateActuator | PointActuator | PointToPointActuator | TorqueActuator):
+        return None
+    ideal = actuator.copy_deep()
+    ideal.optimal_force = 1.0
+    return ideal
+
+
+class _Loads:
+    """What the joints carry along a motion, by the Newton-Euler equations of the bodies beyond them."""
+
+    def __init__(self, motion: Motion, controls: Controls | None) -> None:
+        simulation, self.mechanism = motion.simulation, motion.mechanism
+        engine, count = simulation.engine, len(simulation.state.order)
+        self.system = System(self.mechanism, simulation.forces, apart=True)
+        if controls is not None:
+            self.system.drive(controls)
+        accelerations = (engine.derivative(t, y)[count : 2 * count] for t, y in motion.moments)
+        pairs = zip(motion.moments, accelerations, strict=True)
+        self.links = np.array([self.system.links_in_motion(t, y, udot) for (t, y), udot in pairs])
+        self.carried = {body.mobilizer.joint: place for place, body in enumerate(self.mechanism.bodies)}
+
+    def of(self, joint: Joint, side: str) -> tuple[Array, Array, Array]:
+        """Force, moment, and the origin of the joint's frame at which they act (t, 3), in ground."""
+        outer = self.carried[joint.path]
+        body, link = self.mechanism.bodies[outer], self.links[:, outer]
+        mobilizer = body.mobilizer
+        # The body that the joint carries in the tree gets what is missing there, the other one the opposite.
+        is_outer = (side == "child") != mobilizer.reversed
+        wrench = (-1.0 if is_outer else 1.0) * link[:, layout.WRENCH : layout.WRENCH + 6]
+        frame = mobilizer.child_frame if side == "child" else mobilizer.parent_frame
+        _, place = self.placed(outer if is_outer else body.parent, frame)
+        arm = place - link[:, layout.ORIGIN : layout.ORIGIN + 3]
+        return wrench[:, 3:], wrench[:, :3] - np.cross(arm, wrench[:, 3:]), place
+
+    def placed(self, body: int, frame: Array) -> tuple[Array, Array]:
+        """Rotation (t, 3, 3) and origin (t, 3) in ground of a frame (4, 4) of a body."""
+        if body == GROUND:
+            count = len(self.links)
+            return np.tile(frame[:3, :3], (count, 1, 1)), np.tile(frame[:3, 3], (count, 1))
+        link, frame = self.links[:, body], self.system.placements[body].frame @ frame
+        rotation = link[:, :9].reshape(-1, 3, 3)
+        return rotation @ frame[:3, :3], link[:, layout.POSITION : layout.POSITION + 3] + rotation @ frame[:3, 3]

@@ -1,0 +1,52 @@
+"""What joints carry, beside OpenSim: sides, frames, welded and coupled joints, actuators that push as a file says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.models.jumper import jumper
+from osimlite.schema.actuators import ScalarActuator
+from osimlite.schema.model import Model
+from osimlite.simulation.files.storage import read_sto, write_sto
+from tests.oracle.test_run_tools import both, compare, real
+
+pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytestmark = pytest.mark.oracle
+
+MORE = """
+    <output_precision>16</output_precision><initial_time>0.1</initial_time><final_time>0.14</final_time>
+    <solve_for_equilibrium_for_auxiliary_states>true</solve_for_equilibrium_for_auxiliary_states>
+    <AnalysisSet><objects>
+        <JointReaction name="all"/>
+        <JointReaction name="parent">
+            <apply_on_bodies>parent</apply_on_bodies><express_in_frame>parent</express_in_frame>
+        </JointReaction>
+        <JointReaction name="some">
+            <joint_names>{joints}</joint_names><apply_on_bodies>child parent</apply_on_bodies>
+            <express_in_frame>child {frame}</express_in_frame>
+        </JointReaction>
+        <JointReaction name="given"><forces_file>forces.sto</forces_file></JointReaction>
+    </objects></AnalysisSet>
+"""
+
+
+@pytest.mark.parametrize("name", ["arm26", "jumper", "gait10", "Rajagopal2016", "gait2392"])
+def test_joint_reactions(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    ids = {"arm26": "m0001", "gait10": "m0005", "Rajagopal2016": "m0954", "gait2392": "m0013"}
+    model: Model = jumper() if name == "jumper" else osimlite.read(real(corpus, ids[name]))
+    joints = [joint.name for joint in model.joint_set.objects]
+    frame = model.joint_set.objects[0].frames[-1].path if name != "jumper" else "ground"
+    actuators = [item.name for item in model.components(ScalarActuator)]
+    rows = [[50.0 + 10.0 * k + 100.0 * t for k in range(len(actuators))] for t in (0.0, 0.12, 0.3)]
+    write_sto(tmp_path / "forces.sto", "forces", [0.0, 0.12, 0.3], actuators, rows)
+    more = MORE.format(joints=f"{joints[0]} {joints[-1]}", frame=frame)
+    ours, theirs = both(tmp_path, model, "AnalyzeTool", more)
+    largest = max(np.abs(read_sto(file).rows).max() for file in theirs.iterdir())
+    # Where there are constraints, OpenSim's poses fulfil them to 1e-9 rad.
+    compare(ours, theirs, 1e-8, (1e-9 if name == "Rajagopal2016" else 1e-10) * largest)
