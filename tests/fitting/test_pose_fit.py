@@ -261,3 +261,19 @@ def test_a_jump_is_followed() -> None:
     poses = np.array([(0.1, 0.0, 0.0, 0.0, 0.0, 0.0), (0.9, 0.5, -0.4, 2.0, 3.0, -4.0), (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)])
     frames = np.array([places_at(mechanism, markers, q) for q in poses]).reshape(3, -1)
     assert PoseFit(mechanism, markers).fit(frames, q=np.zeros(6)).values == pytest.approx(poses, abs=1e-8)
+
+
+@pytest.mark.parametrize("goal", [False, True])
+def test_the_first_pose_has_no_whole_turns(goal: bool) -> None:
+    """Wherever a body is turned to, its angles are those within half a turn of where the fit began."""
+    model, body = Model(name="arm"), Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    model.add(body)
+    model.add(osimlite.GimbalJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body))
+    mechanism, rng = osimlite.mechanism(model), np.random.default_rng(0)
+    markers = markers_of(mechanism, rng)
+    fit = PoseFit(mechanism, markers, goals=[Goal(0, 1e-4)] if goal else [])
+    for _ in range(60):
+        q = rng.uniform(-3.0, 3.0, 3)
+        poses = fit.fit(np.array([[*places_at(mechanism, markers, q).ravel(), 0.0]]), q=np.zeros(3))
+        assert np.abs(poses.values).max() <= np.pi + (0.05 if goal else 1e-8) and not poses.unsettled
+        assert poses.costs[0] <= (0.5e-4 * np.pi**2 if goal else 1e-20)

@@ -8,7 +8,7 @@ Marquardt do. What nothing measures hardly moves: of all poses that fit alike th
 
 from __future__ import annotations
 
-from math import inf
+from math import floor, inf, pi
 
 from osimlite.simulation.kernels.layout import FREEDOMS, OK
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
@@ -148,6 +148,9 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     if leave_ends(m, y, start):
         value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
         steps += more
+    if kept == 0 and unwind(m, y, last, start, value):
+        value, more, status = descend(m, start, y, cost(m, start), lightest, lightest)
+        steps += more
     free_ends(m)
     copy(size, last, at(last, size))
     copy(size, y, last)
@@ -215,6 +218,22 @@ def leave_ends(m: Fit, y: Floats, start: Floats) -> bool:
         if m.p[m.p[RESOLVED_AT] + k] == AT_END and low < high:
             inwards = min(INWARDS, 0.5 * (high - low))
             start[k], found = low + inwards if y[k] <= low else high - inwards, True
+    return found
+
+
+def unwind(m: Fit, y: Floats, first: Floats, start: Floats, value: float) -> bool:
+    """A pose without the whole turns that the way from the first one has led to, if it costs no more."""
+    size, ranges, trial, found = m.s[FREEDOMS], at(m.c, m.p[RANGES_AT]), at(m.v, m.p[TRIAL]), False
+    copy(size, y, start)
+    for k in range(size):
+        turns = floor((y[k] - first[k]) / (2.0 * pi) + 0.5)
+        near = y[k] - 2.0 * pi * turns
+        if turns != 0.0 and ranges[2 * k] <= near <= ranges[2 * k + 1]:
+            copy(size, start, trial)
+            trial[k] = near
+            if settle(m, trial) and cost(m, trial) <= value * (1.0 + 1e-9) + 1e-20:
+                copy(size, trial, start)
+                found = True
     return found
 
 
