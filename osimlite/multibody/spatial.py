@@ -6,7 +6,6 @@ moving frame.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -62,13 +61,15 @@ def rotation_about_space(angles: ArrayLike) -> Array:
 
 
 def angles_xyz(rotation: Array) -> Array:
-    """Body-fixed X-Y-Z angles (3,) of a rotation matrix, the second from -90 to 90 degrees (rad)."""
-    (r11, r12, r13), (r21, r22, r23), (_, _, r33) = rotation.tolist()
-    second = math.asin(min(1.0, max(-1.0, r13)))
-    if abs(r13) > 1.0 - 1e-14:
-        # Only the sum (or difference) of the other two shows; let the third be zero.
-        return np.array((math.atan2(r21, r22) * math.copysign(1.0, r13), second, 0.0))
-    return np.array((math.atan2(-r23, r33), second, math.atan2(-r12, r11)))
+    """Body-fixed X-Y-Z angles (..., 3) of rotation matrices (..., 3, 3), the second from -90 to 90 degrees (rad)."""
+    r13 = rotation[..., 0, 2]
+    first = np.arctan2(-rotation[..., 1, 2], rotation[..., 2, 2])
+    third = np.arctan2(-rotation[..., 0, 1], rotation[..., 0, 0])
+    # Where only the sum (or difference) of the other two shows, let the third be zero.
+    is_straight = np.abs(r13) > 1.0 - 1e-14
+    alone = np.arctan2(rotation[..., 1, 0], rotation[..., 1, 1]) * np.copysign(1.0, r13)
+    second = np.arcsin(np.clip(r13, -1.0, 1.0))
+    return np.stack([np.where(is_straight, alone, first), second, np.where(is_straight, 0.0, third)], axis=-1)
 
 
 def quaternion(rotation: ArrayLike) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.multibody.parts import GROUND
+from osimlite.records import dataclass
 from osimlite.simulation.kernels import layout
 
 if TYPE_CHECKING:
@@ -48,3 +49,64 @@ def stations(system: System, moments: Moments, body: int, location: Floats) -> F
     if link == GROUND:
         return np.tile(np.append(point, np.zeros(3)), (len(moments), 1))
     return moving(system.links_at(moments)[:, link], point)
+
+
+@dataclass(frozen=True, eq=False)
+class LinkMotion:
+    """The motion of links at t moments, and of the bodies that are fixed to them; all along the axes of ground.
+
+    Attributes:
+        system: whose links.
+        links: what the kernels find of them in motion (t, l, n).
+    """
+
+    system: System
+    links: Floats
+
+    @classmethod
+    def of(cls, system: System, moments: Moments, accelerations: Floats) -> LinkMotion:
+        """The motion of the links of a system at some moments, with the derivatives (t, n) of its speeds.
+
+        Raises:
+            SimulationError: the rates of coordinates are not defined there, or a force cannot be computed.
+        """
+        pairs = zip(moments, accelerations, strict=True)
+        found = [system.links_in_motion(t, y, udot) for (t, y), udot in pairs]
+        return cls(system, np.array(found).reshape(len(found), -1, layout.LINK_WORK))
+
+    def placed(self, body: int, frame: Floats) -> tuple[Floats, Floats]:
+        """Rotation (t, 3, 3) and origin (t, 3), m, of a frame (4, 4) of a body (-1 for ground)."""
+        link, placed = self._own(body)
+        frame = placed @ frame
+        if link is None:
+            count = len(self.links)
+            return np.tile(frame[:3, :3], (count, 1, 1)), np.tile(frame[:3, 3], (count, 1))
+        rotation = link[:, :9].reshape(-1, 3, 3)
+        return rotation @ frame[:3, :3], link[:, layout.POSITION : layout.POSITION + 3] + rotation @ frame[:3, 3]
+
+    def turning(self, body: int) -> tuple[Floats, Floats]:
+        """Angular velocity (rad/s) and acceleration (rad/s²) of a body, (t, 3) each."""
+        link, _ = self._own(body)
+        if link is None:
+            return np.zeros((len(self.links), 3)), np.zeros((len(self.links), 3))
+        w, alpha = (link[:, first : first + 3] for first in (layout.VELOCITY, layout.ACCELERATION))
+        return w, alpha
+
+    def point(self, body: int, location: Floats) -> tuple[Floats, Floats, Floats]:
+        """Place (m), velocity (m/s) and acceleration (m/s²) of a point (3,) of a body, (t, 3) each."""
+        link, frame = self._own(body)
+        point = frame[:3, :3] @ location + frame[:3, 3]
+        if link is None:
+            still = np.zeros((len(self.links), 3))
+            return still + point, still, still
+        place, velocity = np.split(moving(link, point), 2, axis=-1)
+        w, alpha = self.turning(body)
+        # The kernels accelerate everything upwards in place of gravity, about an origin that stays.
+        free = link[:, layout.ACCELERATION + 3 : layout.ACCELERATION + 6] + self.system.mechanism.gravity
+        arm = place - link[:, layout.ORIGIN : layout.ORIGIN + 3]
+        return place, velocity, free + np.cross(alpha, arm) + np.cross(w, velocity)
+
+    def _own(self, body: int) -> tuple[Floats | None, Floats]:
+        """The link (t, n) of a body, None for ground, and the body's frame in it."""
+        link, frame = self.system.placements[body] if body != GROUND else (GROUND, np.eye(4))
+        return None if link == GROUND else self.links[:, link], frame

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import SettingError
-from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.schema.model import Model
+from osimlite.simulation.elements import Forces
 from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.link_motion import LinkMotion
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
 from osimlite.text import did_you_mean
@@ -78,10 +79,18 @@ class Motion:
         return found
 
     @cached_property
-    def kinematics(self) -> list[Kinematics]:
+    def links(self) -> LinkMotion:
         """Where the bodies are and how they move at every time."""
-        rows = zip(self.values, self.speeds, self.times.tolist(), strict=True)
-        return [self.mechanism.at(q, u, t) for q, u, t in rows]
+        system = System(self.mechanism.released(), Forces(()))
+        rows = zip(self.values.tolist(), self.speeds.tolist(), strict=True)
+        moments = [(t, system.state.pack(q, u)) for t, (q, u) in zip(self.times.tolist(), rows, strict=True)]
+        return LinkMotion.of(system, moments, self.accelerations[:, list(system.order)])
+
+    def frame(self, asked: str, kind: str, *places: str) -> str | None:
+        """The path of a frame of a class that is found by its path from the model, or from other places there."""
+        tree = self.model.tree()
+        found = (tree.walk(asked, place, kind).target for place in ("", *places))
+        return next((tree.path_of(item) for item in found if item is not None), None)
 
     def chosen(self, wanted: Sequence[Any], names: Sequence[str], what: str) -> list[int]:
         """Places of the names that an analysis asks for; "all" stands for all of them.

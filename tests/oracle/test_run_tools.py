@@ -38,8 +38,23 @@ ANALYSES = """
             <objects>
                 <Kinematics name="K"/>
                 <BodyKinematics name="B"><in_degrees>false</in_degrees></BodyKinematics>
+                <BodyKinematics name="L">
+                    <express_results_in_body_local_frame>true</express_results_in_body_local_frame>
+                </BodyKinematics>
                 <PointKinematics name="P">
                     <body_name>{body}</body_name>
+                    <point_name>tip</point_name>
+                    <point>0.1 0.02 0.03</point>
+                </PointKinematics>
+                <PointKinematics name="R">
+                    <body_name>ground</body_name>
+                    <relative_to_body_name>/bodyset/{body}</relative_to_body_name>
+                    <point_name>tip</point_name>
+                    <point>0.1 0.02 0.03</point>
+                </PointKinematics>
+                <PointKinematics name="Q">
+                    <body_name>{body}</body_name>
+                    <relative_to_body_name>{frame}</relative_to_body_name>
                     <point_name>tip</point_name>
                     <point>0.1 0.02 0.03</point>
                 </PointKinematics>
@@ -100,8 +115,8 @@ def test_analyses(
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
     model = jumper() if name == "jumper" else osimlite.read(real(corpus, "m0001"))
-    body = model.body_set.objects[-1].name
-    more = ANALYSES.format(start=start, equilibrium=equilibrium, body=body)
+    body, frame = model.body_set.objects[-1].name, model.tree().path_of(model.joint_set.objects[-1].frames[0])
+    more = ANALYSES.format(start=start, equilibrium=equilibrium, body=body, frame=frame)
     # Muscles in equilibrium hardly move their fibers: what is left of that is rounding.
     compare(*both(tmp_path, model, "AnalyzeTool", more, cutoff), 1e-8, 1e-8)
 

@@ -195,9 +195,9 @@ class RecordedMotion:
         rows = np.empty((len(self.times), len(columns) + 3))
         for row, q in zip(rows, self.values, strict=True):
             state = mechanism.at(q)
-            angles = [np.degrees(angles_xyz(rotation)) for rotation in state.rotations[:-1]]
+            angles = np.degrees(angles_xyz(state.rotations[:-1]))
             centres = MassCentres.of(state).positions()
-            row[:-3] = np.concatenate([centres, np.reshape(angles, (-1, 3))], axis=1).ravel()
+            row[:-3] = np.concatenate([centres, angles], axis=1).ravel()
             row[-3:] = mechanism.inertial[0] @ centres / (mechanism.total_mass or 1.0)
         labels = (*columns, *(f"center_of_mass_{axis}" for axis in "XYZ"))
         return StoTable("Positions", self.times, labels, rows, in_degrees=True)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.multibody.parts import GROUND
 from osimlite.multibody.schema_frames import Placements
 from osimlite.multibody.spatial import Array
 from osimlite.schema.actuators import (
@@ -24,6 +23,7 @@ from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.files.storage import read_sto
 from osimlite.simulation.given_controls import driven
 from osimlite.simulation.kernels import layout
+from osimlite.simulation.link_motion import LinkMotion
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
 from osimlite.text import counted, did_you_mean, listed
@@ -57,9 +57,9 @@ def compute(analysis: JointReaction, motion: Motion, tables: Tables) -> None:
         if side not in ("child", "parent"):
             raise tables.job.error(f"apply_on_bodies has '{side}'; it says child or parent")
         bases = {end: _base(model, joint, end) for end in ("child", "parent")}
-        frame = _frame(model, asked, bases, tables)
+        frame = _frame(motion, asked, bases, tables)
         force, moment, place = loads.of(joint, side)
-        rotation, origin = loads.placed(*mechanism.placement(frame))
+        rotation, origin = loads.moved.placed(*mechanism.placement(frame))
         back = rotation.transpose(0, 2, 1)
         rows += [(back @ item[..., None])[..., 0] for item in (force, moment, place - origin)]
         root = f"{joint.name}_on_{_last(bases[side])}_in_{_last(frame)}"
@@ -97,18 +97,13 @@ def _base(model: Model, joint: Joint, end: str) -> str:
     return placements.frame(placements.named(joint, f"socket_{end}_frame"))[0]
 
 
-def _frame(model: Model, asked: str, bases: dict[str, str], tables: Tables) -> str:
+def _frame(motion: Motion, asked: str, bases: dict[str, str], tables: Tables) -> str:
     """The path of a frame that is asked for by a word or as OpenSim finds it: in the model, its bodies, its joints."""
-    tree = model.tree()
-    for base in ("", "/bodyset", "/jointset"):
-        found = tree.walk(asked, base, "Frame").target
-        if found is not None:
-            return tree.path_of(found) or ""
-    if asked.lower() in bases:
-        return bases[asked.lower()]
-    raise tables.job.error(
-        f"express_in_frame has '{asked}', which is no frame of the model; say child, parent or a frame"
-    )
+    found = motion.frame(asked, "Frame", "/bodyset", "/jointset") or bases.get(asked.lower())
+    if found is None:
+        told = f"express_in_frame has '{asked}', which is no frame of the model; say child, parent or a frame"
+        raise tables.job.error(told)
+    return found
 
 
 def _last(path: str) -> str:
@@ -168,34 +163,22 @@ class _Loads:
     """What the joints carry along a motion, by the Newton-Euler equations of the bodies beyond them."""
 
     def __init__(self, motion: Motion, controls: Controls | None) -> None:
-        simulation, self.mechanism = motion.simulation, motion.mechanism
-        engine, count = simulation.engine, len(simulation.state.order)
-        self.system = System(self.mechanism, simulation.forces, apart=True)
+        self.mechanism = motion.mechanism
+        system = System(self.mechanism, motion.simulation.forces, apart=True)
         if controls is not None:
-            self.system.drive(controls)
-        accelerations = (engine.derivative(t, y)[count : 2 * count] for t, y in motion.moments)
-        pairs = zip(motion.moments, accelerations, strict=True)
-        self.links = np.array([self.system.links_in_motion(t, y, udot) for (t, y), udot in pairs])
+            system.drive(controls)
+        self.moved = LinkMotion.of(system, list(motion.moments), motion.accelerations[:, list(system.order)])
         self.carried = {body.mobilizer.joint: place for place, body in enumerate(self.mechanism.bodies)}
 
     def of(self, joint: Joint, side: str) -> tuple[Array, Array, Array]:
         """Force, moment, and the origin of the joint's frame at which they act (t, 3), in ground."""
         outer = self.carried[joint.path]
-        body, link = self.mechanism.bodies[outer], self.links[:, outer]
+        body, link = self.mechanism.bodies[outer], self.moved.links[:, outer]
         mobilizer = body.mobilizer
         # The body that the joint carries in the tree gets what is missing there, the other one the opposite.
         is_outer = (side == "child") != mobilizer.reversed
         wrench = (-1.0 if is_outer else 1.0) * link[:, layout.WRENCH : layout.WRENCH + 6]
         frame = mobilizer.child_frame if side == "child" else mobilizer.parent_frame
-        _, place = self.placed(outer if is_outer else body.parent, frame)
+        _, place = self.moved.placed(outer if is_outer else body.parent, frame)
         arm = place - link[:, layout.ORIGIN : layout.ORIGIN + 3]
         return wrench[:, 3:], wrench[:, :3] - np.cross(arm, wrench[:, 3:]), place
-
-    def placed(self, body: int, frame: Array) -> tuple[Array, Array]:
-        """Rotation (t, 3, 3) and origin (t, 3) in ground of a frame (4, 4) of a body."""
-        if body == GROUND:
-            count = len(self.links)
-            return np.tile(frame[:3, :3], (count, 1, 1)), np.tile(frame[:3, 3], (count, 1))
-        link, frame = self.links[:, body], self.system.placements[body].frame @ frame
-        rotation = link[:, :9].reshape(-1, 3, 3)
-        return rotation @ frame[:3, :3], link[:, layout.POSITION : layout.POSITION + 3] + rotation @ frame[:3, 3]
