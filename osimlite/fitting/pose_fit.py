@@ -30,7 +30,9 @@ class Poses(NamedTuple):
     Attributes:
         values: of all coordinates (t, n), rad and m.
         places: of the markers in these poses (t, m, 3), m.
-        costs: half the weighted mean of the squared distances of the markers, and the other squares (t,).
+        turns: of the sensors from where they were measured (t, k, 3), in ground, rad; NaN where one was not.
+        costs: half the weighted means of the squared distances of the markers and of the squared angles of the sensors,
+            and the squares of the goals (t,).
         steps: Newton steps that were taken (t,).
         unseen: frames of which nothing was measured: they have the pose of the frame before.
         unsettled: frames in which the search ended before the best pose was certain.
@@ -38,6 +40,7 @@ class Poses(NamedTuple):
 
     values: Array
     places: Array
+    turns: Array
     costs: Array
     steps: Array
     unseen: tuple[int, ...]
@@ -60,9 +63,11 @@ class PoseFit:
 
     Attributes:
         markers: how many there are.
+        sensors: likewise.
         order: places in the mechanism of the coordinates that are found.
         width: count of the numbers of one frame: the markers' places, the rotations, the goals, and what is held.
-        found: count of those that the kernel finds: the values, the markers' places, cost, steps, and an ending.
+        found: count of those that the kernel finds: the values, the markers' places, the sensors' turns, cost, steps,
+            and an ending.
 
     Raises:
         UnsupportedError: a joint, a function or a constraint that the kernels do not know.
@@ -99,7 +104,7 @@ class PoseFit:
         self._shape = FitLayout(self._system, places, markers, sensors, kept, list(self._held), self._couplers)
         self._history = self._shape.work[self._shape.ints[fit.HISTORY] :]
         self.width = self._measured + len(kept) + len(self._held)
-        self.found = len(self.order) + 3 * len(markers) + 3
+        self.sensors, self.found = len(sensors), len(self.order) + 3 * (len(markers) + len(sensors)) + 3
 
     def start(self, q: Array) -> None:
         """Begin anew, at the values (n,) of all coordinates."""
@@ -132,9 +137,10 @@ class PoseFit:
             raise self.apart(int(np.argmax(status == APART)))
         values = np.tile(self.mechanism.values({}), (count, 1))
         values[:, self.order] = found[:, :free]
-        places = found[:, free:-3].reshape(count, self.markers, 3)
+        vectors = found[:, free:-3].reshape(count, -1, 3)
         unseen, unsettled = (tuple(np.flatnonzero(status == what).tolist()) for what in (UNSEEN, STUCK))
-        return Poses(values, places, found[:, -3], found[:, -2], unseen, unsettled)
+        places, turns = vectors[:, : self.markers], vectors[:, self.markers :]
+        return Poses(values, places, turns, found[:, -3], found[:, -2], unseen, unsettled)
 
     def bound(self, frames: Array, found: Array) -> Callable[[int], int]:
         """What fits a number of frames of arrays that the caller keeps, as the kernel takes them."""

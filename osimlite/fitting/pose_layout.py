@@ -37,7 +37,7 @@ class Marker:
 
 @dataclass(frozen=True)
 class Sensor:
-    """A frame of a body whose rotation is measured, and how much the squared angle counts (1/rad²)."""
+    """A frame of a body whose rotation is measured, and how much the squared angle counts beside those of others."""
 
     frame: FramePlacement
     weight: float = 1.0

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 import osimlite
 from osimlite import Body, FreeJoint, Model, PhysicalOffsetFrame, PinJoint
@@ -91,6 +92,51 @@ def test_the_derivatives_are_those_of_the_cost(case: Case, seed: int) -> None:
         assert slope[number] == pytest.approx((ahead[0] - behind[0]) / 2e-5, abs=2e-9)
         if not any(body.mobilizer.joint_type == ROUND for body in mechanism.bodies):
             assert second[number] == pytest.approx((ahead[1] - behind[1]) / 2e-5, abs=2e-8)
+
+
+def sensors_of(mechanism: Mechanism, rng: np.random.Generator) -> list[Sensor]:
+    """A sensor on every body and one in ground."""
+    return [
+        Sensor(FramePlacement(body, transform(rotation_xyz(rng.uniform(-3.0, 3.0, 3)))), float(rng.uniform(0.2, 5.0)))
+        for body in (-1, *range(len(mechanism.bodies)))
+    ]
+
+
+def orientations_at(mechanism: Mechanism, sensors: list[Sensor], q: Any) -> Any:
+    """How the sensors are turned (k, 3, 3)."""
+    state = mechanism.at(q)
+    return np.array([(state.transform(sensor.frame.body) @ sensor.frame.transform)[:3, :3] for sensor in sensors])
+
+
+def turns_between(wanted: Any, found: Any) -> Any:
+    """The turns (k, 3) in ground that take rotations to others, rad."""
+    return Rotation.from_matrix(found @ np.swapaxes(wanted, -1, -2)).as_rotvec()
+
+
+@given(cases(max_bodies=4), st.integers(0, 99), st.floats(0.0, 2.9))
+@settings(max_examples=25)
+def test_the_derivatives_of_angles_are_those_of_the_cost(case: Case, seed: int, far: float) -> None:
+    """Gradient and second derivative against differences, with sensors that are turned far, and one that is silent."""
+    mechanism, rng = case.mechanism, np.random.default_rng(seed)
+    if not mechanism.coordinates:
+        return
+    sensors = sensors_of(mechanism, rng)
+    axes = rng.normal(size=(len(sensors), 3))
+    off = Rotation.from_rotvec(far * axes / np.linalg.norm(axes, axis=1)[:, None]).as_matrix()
+    measured = off @ orientations_at(mechanism, sensors, case.q)
+    measured[-1, 1, 1] = np.nan if len(sensors) > 2 else measured[-1, 1, 1]
+    fit = PoseFit(mechanism, [], sensors, code=PYTHON)
+    frame = measured.ravel()
+    value, slope, second = derivatives(fit, frame, case.q)
+    # OpenSim's own: half the weighted mean of the squared angles.
+    assert value == pytest.approx(0.5 * far**2, rel=1e-9, abs=1e-15)
+    for number, place in enumerate(fit.order):
+        step = np.zeros(len(case.q))
+        step[place] = 1e-5
+        ahead, behind = (derivatives(fit, frame, case.q + sign * step) for sign in (1.0, -1.0))
+        assert slope[number] == pytest.approx((ahead[0] - behind[0]) / 2e-5, abs=1e-8)
+        if not any(body.mobilizer.joint_type == ROUND for body in mechanism.bodies):
+            assert second[number] == pytest.approx((ahead[1] - behind[1]) / 2e-5, abs=1e-7, rel=1e-6)
 
 
 @given(cases(max_bodies=4), st.integers(0, 99), st.sampled_from(["", "coupler", "point", "distance", "line", "weld"]))
@@ -252,6 +298,38 @@ def test_sensors_turn_bodies(far: float) -> None:
     poses = fit.fit(wanted.reshape(1, -1), q=np.zeros(6))
     assert poses.costs[0] == pytest.approx(0.0, abs=1e-16)
     assert mechanism.at(poses.values[0]).rotations[0] @ frame[:3, :3] == pytest.approx(wanted, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    "axis", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.6, -0.8, 0.0), (-0.6, 0.0, 0.8)]
+)
+@pytest.mark.parametrize("short", [0.0, 1e-13, 1e-7, 1e-3])
+def test_a_sensor_that_is_half_a_turn_off_is_found(axis: tuple[float, float, float], short: float) -> None:
+    """A cost without a slope is none: whichever way round, the whole half turn counts."""
+    mechanism = _free_body()
+    sensor = Sensor(FramePlacement(0, np.eye(4)))
+    wanted = Rotation.from_rotvec((np.pi - short) * np.array(axis)).as_matrix()
+    value, _, _ = derivatives(PoseFit(mechanism, [], [sensor], code=PYTHON), wanted.ravel(), np.zeros(6))
+    assert value == pytest.approx(0.5 * (np.pi - short) ** 2, rel=1e-12)
+    poses = PoseFit(mechanism, [], [sensor]).fit(wanted.reshape(1, -1), q=np.zeros(6))
+    assert orientations_at(mechanism, [sensor], poses.values[0])[0] == pytest.approx(wanted, abs=1e-8)
+
+
+def test_markers_and_sensors_count_as_shares() -> None:
+    """The cost is the mean of the markers and the mean of the sensors; the turns that are left are told."""
+    mechanism, rng = _free_body(), np.random.default_rng(5)
+    markers, sensors = markers_of(mechanism, rng), [Sensor(FramePlacement(0, np.eye(4)), 3.0) for _ in range(3)]
+    q = np.array((0.3, 0.2, -0.1, 0.4, 0.5, 0.6))
+    measured = places_at(mechanism, markers, q) + rng.normal(0.0, 0.02, (3, 3))
+    noise = Rotation.from_rotvec(rng.normal(0.0, 0.1, (3, 3))).as_matrix()
+    rotations = noise @ orientations_at(mechanism, sensors, q)
+    rotations[1] = np.nan
+    poses = PoseFit(mechanism, markers, sensors).fit(np.concatenate([measured.ravel(), rotations.ravel()])[None], q=q)
+    found = poses.values[0]
+    turns = turns_between(rotations[[0, 2]], orientations_at(mechanism, sensors, found)[[0, 2]])
+    angles = np.sum(turns**2, axis=1)
+    assert poses.costs[0] == pytest.approx(cost_of(mechanism, markers, measured, found) + 0.25 * angles.sum())
+    assert poses.turns[0, [0, 2]] == pytest.approx(turns, abs=1e-12) and np.isnan(poses.turns[0, 1]).all()
 
 
 def test_a_jump_is_followed() -> None:

@@ -6,16 +6,12 @@ of the second derivative is the mass matrix of these masses, found by the compos
 follows from how the axes of the joints turn one another (R. Featherstone, Rigid Body Dynamics Algorithms, 2008,
 chapters 2.10 and 6.2): a turn about an axis carries the columns of all that it carries.
 
-Second derivatives leave out how functions of several coordinates are bent, and how angles of sensors are.
+Second derivatives leave out how functions of several coordinates are bent.
 """
 
 from __future__ import annotations
 
-from math import acos, pi, sqrt
-
 from osimlite.forces.vectors import (
-    ZERO,
-    Vector,
     cross,
     dot,
     minus,
@@ -50,7 +46,7 @@ from osimlite.simulation.kernels.layout import (
     WRENCH,
 )
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
-from osimlite.simulation.kernels.points import direction, station
+from osimlite.simulation.kernels.points import station
 from osimlite.simulation.kernels.pose_bend import bend_joint, twisted
 from osimlite.simulation.kernels.pose_record import (
     ARGUMENTS_OF,
@@ -71,8 +67,6 @@ from osimlite.simulation.kernels.pose_record import (
     NUMBERS_OF,
     ROOM,
     ROWS,
-    SENSOR_AT,
-    SENSOR_NUMBERS,
     SENSORS,
     SLOPE,
     STIFFNESS,
@@ -80,6 +74,7 @@ from osimlite.simulation.kernels.pose_record import (
     WEIGHTS,
     Fit,
 )
+from osimlite.simulation.kernels.pose_sensors import sensors_turn
 from osimlite.simulation.kernels.projection import position_errors, rows_by_values
 from osimlite.simulation.kernels.trigonometry import sine_cosine
 
@@ -174,45 +169,6 @@ def markers_pull(m: Fit) -> float:
         put(turned, 3, plus(vector(turned, 3), times(py, arm)))
         put(turned, 6, plus(vector(turned, 6), times(pz, arm)))
     return value
-
-
-def sensors_turn(m: Fit) -> float:
-    """Put the springs of the sensors on the links; what they cost."""
-    s, w, p, v, value = m.s, m.w, m.p, m.v, 0.0
-    for k in range(p[SENSORS]):
-        weight, link = v[p[WEIGHTS] + p[MARKERS] + k], p[p[SENSOR_AT] + k]
-        if not weight > 0.0:
-            continue
-        rows = at(m.c, MARKER_NUMBERS * p[MARKERS] + SENSOR_NUMBERS * k)
-        off = turn_between(s, w, link, rows, at(v, p[MEASURED] + 3 * p[MARKERS] + 9 * k))
-        value += 0.5 * weight * dot(off, off)
-        if link >= 0:
-            here = at(w, s[WORK_LINK] + LINK_WORK * link)
-            i, load = at(here, INERTIA), at(here, WRENCH)
-            for axis in range(4, 7):
-                i[axis] += weight
-            put(load, 0, plus(vector(load, 0), times(weight, off)))
-    return value
-
-
-def turn_between(s: Ints, w: Floats, link: int, rows: Floats, wanted: Floats) -> Vector:
-    """The turn (rad, in ground) that takes a wanted rotation to that of a frame of a link; both are given by rows."""
-    twist, trace = ZERO, 0.0
-    for k in range(3):
-        is_axis = direction(s, w, link, (rows[k], rows[3 + k], rows[6 + k]))
-        axis = wanted[k], wanted[3 + k], wanted[6 + k]
-        twist = plus(twist, cross(axis, is_axis))
-        trace += dot(axis, is_axis)
-    cosine, sine = 0.5 * (trace - 1.0), 0.5 * sqrt(dot(twist, twist))
-    if not sine > 1e-12:
-        return times(0.5, twist)
-    angle = acos(max(-1.0, cosine)) if cosine < 0.7 else sine_angle(sine)
-    return times(0.5 * angle / sine, twist)
-
-
-def sine_angle(sine: float) -> float:
-    """The acute angle of a sine."""
-    return 0.5 * pi - acos(min(1.0, sine))
 
 
 def gather(m: Fit, y: Floats) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from math import floor, inf, pi
 
+from osimlite.forces.vectors import put
 from osimlite.simulation.kernels.layout import FREEDOMS, OK
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import station
@@ -38,6 +39,7 @@ from osimlite.simulation.kernels.pose_record import (
     WEIGHTS,
     Fit,
 )
+from osimlite.simulation.kernels.pose_sensors import turn_of
 from osimlite.simulation.kernels.pose_step import find_ends, find_step, free_ends, list_free, solve_free
 from osimlite.simulation.kernels.states import copy, is_finite
 
@@ -82,12 +84,13 @@ def fit_frames(
         frames: of each the places of the markers (m, 3) in ground, the rotations of the sensors (k, 3, 3), the values
             of the goals, those of what is held.
         found: of each the values of all degrees of freedom, the places of the markers in the fitted pose (m, 3), the
-            cost, the count of the steps, and what became of it.
+            turns of the sensors from where they were measured (k, 3), the cost, the count of the steps, and what became
+            of it.
         count: of the frames.
     """
     m = Fit(s, x, w, f, p, c, v)
-    size, markers = s[FREEDOMS], p[MARKERS]
-    width, given = size + 3 * markers + 3, 3 * markers + 9 * p[SENSORS] + p[GOALS] + p[HELD]
+    size, markers, sensors = s[FREEDOMS], p[MARKERS], p[SENSORS]
+    width, given = size + 3 * (markers + sensors) + 3, 3 * markers + 9 * sensors + p[GOALS] + p[HELD]
     for number in range(count):
         to = at(found, width * number)
         copy(given, at(frames, given * number), at(v, p[MEASURED]))
@@ -97,8 +100,10 @@ def fit_frames(
             place = station(
                 s, w, p[p[MARKER_AT] + k], (c[MARKER_NUMBERS * k], c[MARKER_NUMBERS * k + 1], c[MARKER_NUMBERS * k + 2])
             )
-            to[size + 3 * k], to[size + 3 * k + 1], to[size + 3 * k + 2] = place
-        end = at(to, size + 3 * markers)
+            put(to, size + 3 * k, place)
+        for k in range(sensors):
+            put(to, size + 3 * (markers + k), turn_of(m, k))
+        end = at(to, size + 3 * (markers + sensors))
         end[0], end[1], end[2] = value, float(steps), status
     return OK
 
@@ -238,28 +243,32 @@ def unwind(m: Fit, y: Floats, first: Floats, start: Floats, value: float) -> boo
 
 
 def weigh(m: Fit) -> bool:
-    """The weights in this frame, those of the markers seen as shares of the whole; whether anything is seen."""
+    """The weights in this frame, of markers and of sensors each as shares of what is seen; whether anything is."""
     p, c, v = m.p, m.c, m.v
-    measured, weights, total, seen = at(v, p[MEASURED]), at(v, p[WEIGHTS]), 0.0, False
+    measured, weights = at(v, p[MEASURED]), at(v, p[WEIGHTS])
     markers, sensors = p[MARKERS], p[SENSORS]
+    numbers, rotations = at(c, MARKER_NUMBERS * markers), at(measured, 3 * markers)
     for k in range(markers):
-        weight = c[MARKER_NUMBERS * k + 3]
-        weights[k] = weight if is_finite(3, at(measured, 3 * k)) else 0.0
-        total += weights[k]
-    if total > 0.0:
-        seen = True
-        for k in range(markers):
-            weights[k] /= total
-    numbers = at(c, MARKER_NUMBERS * markers)
+        weights[k] = c[MARKER_NUMBERS * k + 3] if is_finite(3, at(measured, 3 * k)) else 0.0
     for k in range(sensors):
-        is_seen = is_finite(9, at(measured, 3 * markers + 9 * k))
-        weights[markers + k] = numbers[SENSOR_NUMBERS * k + 9] if is_seen else 0.0
-        seen = seen or weights[markers + k] > 0.0
+        weights[markers + k] = numbers[SENSOR_NUMBERS * k + 9] if is_finite(9, at(rotations, 9 * k)) else 0.0
+    seen = share(markers, weights)
+    seen = share(sensors, at(weights, markers)) or seen
     numbers, goals = at(numbers, SENSOR_NUMBERS * sensors), at(measured, 3 * markers + 9 * sensors)
     for k in range(p[GOALS]):
         weights[markers + sensors + k] = numbers[k] if is_finite(1, at(goals, k)) else 0.0
         seen = seen or weights[markers + sensors + k] > 0.0
     return seen
+
+
+def share(count: int, weights: Floats) -> bool:
+    """Make shares of some weights; whether there is any."""
+    total = 0.0
+    for k in range(count):
+        total += weights[k]
+    for k in range(count):
+        weights[k] = weights[k] / total if total > 0.0 else 0.0
+    return total > 0.0
 
 
 def descend(
