@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -9,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from osimlite.errors import SettingError
-from osimlite.fitting.inverse_kinematics import ADVICE, FittedMotion, fitted, marker_stations
+from osimlite.fitting.fitted_motion import ADVICE, FittedMotion
+from osimlite.fitting.inverse_kinematics import check_weight, fitted, marker_stations
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.pose_layout import Goal
 from osimlite.multibody import build_mechanism
@@ -58,8 +60,7 @@ def tasks_of(
     """
     applied = [task for task in tasks if task.apply]
     for task in applied:
-        if not 0.0 <= task.weight < np.inf:
-            raise SettingError(f"the weight {task.weight:g} of the task '{task.name}' is no weight; give one from 0 on")
+        check_weight(task.weight, f"the task '{task.name}'")
     asked = {task.name: float(task.weight) for task in applied if isinstance(task, IKMarkerTask)} or None
     names = data.shared([*marker_stations(model, mechanism)], asked)
     weights = {name: 1.0 if asked is None else asked[name] for name in names}
@@ -126,10 +127,16 @@ def told(motion: FittedMotion) -> Iterator[str]:
             f"{found['frames']} frames, {found['markers']} markers: errors of {100.0 * rms:.2f} cm (root mean square), "
             f"at most {100.0 * largest:.2f} cm ({found['worst_marker']} at {found['worst_time']:g} s){advised}"
         )
+    if "rms_orientation_error" in found:
+        rms, largest = (math.degrees(found[f"{which}_orientation_error"]) for which in ("rms", "largest"))
+        yield (
+            f"{found['frames']} frames, {found['sensors']} sensors: errors of {rms:.2f} degrees (root mean square), "
+            f"at most {largest:.2f} degrees ({found['worst_sensor']} at {found['worst_sensor_time']:g} s)"
+        )
     if found["partly_unseen"]:
         parts = [f"{name} ({100.0 * part:.3g} %)" for name, part in found["partly_unseen"].items()]
         yield f"not seen in every frame: {listed(parts)}"
     if found["frames_unseen"]:
-        yield f"{counted(found['frames_unseen'], 'frame')} without any marker: the pose stays as it was before"
+        yield f"{counted(found['frames_unseen'], 'frame')} in which nothing was seen: the pose stays as it was before"
     if found["frames_unsettled"]:
         yield f"in {counted(found['frames_unsettled'], 'frame')} the best pose was not reached"

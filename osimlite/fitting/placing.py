@@ -7,8 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from osimlite.errors import SettingError
+from osimlite.fitting.fitted_motion import FittedMotion
 from osimlite.fitting.ik_tool import tasks_of
-from osimlite.fitting.inverse_kinematics import FittedMotion, fitted
+from osimlite.fitting.inverse_kinematics import fitted
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.measuring import frames_between
 from osimlite.multibody import build_mechanism

@@ -64,6 +64,7 @@ class PoseFit:
     Attributes:
         markers: how many there are.
         sensors: likewise.
+        measured: count of the numbers of their places and rotations.
         order: places in the mechanism of the coordinates that are found.
         width: count of the numbers of one frame: the markers' places, the rotations, the goals, and what is held.
         found: count of those that the kernel finds: the values, the markers' places, the sensors' turns, cost, steps,
@@ -83,7 +84,7 @@ class PoseFit:
         constraints: bool = True,
         code: Code | None = None,
     ) -> None:
-        self.mechanism, self.markers, self._measured = mechanism, len(markers), 3 * len(markers) + 9 * len(sensors)
+        self.mechanism, self.markers, self.measured = mechanism, len(markers), 3 * len(markers) + 9 * len(sensors)
         infos = list(mechanism.coordinates)
         self._held: dict[int, Function | None] = {}
         free = set(free_coordinates(mechanism))
@@ -103,7 +104,7 @@ class PoseFit:
         kept = [goals[number] for number in self._goals]
         self._shape = FitLayout(self._system, places, markers, sensors, kept, list(self._held), self._couplers)
         self._history = self._shape.work[self._shape.ints[fit.HISTORY] :]
-        self.width = self._measured + len(kept) + len(self._held)
+        self.width = self.measured + len(kept) + len(self._held)
         self.sensors, self.found = len(sensors), len(self.order) + 3 * (len(markers) + len(sensors)) + 3
 
     def start(self, q: Array) -> None:
@@ -128,8 +129,8 @@ class PoseFit:
         count, free = len(measured), len(self.order)
         given = measured.reshape(count, -1)
         frames, found = np.empty((count, self.width)), np.empty((count, self.found))
-        frames[:, : self._measured] = given[:, : self._measured]
-        frames[:, self._measured : self._measured + len(self._goals)] = given[:, self._measured :][:, self._goals]
+        frames[:, : self.measured] = given[:, : self.measured]
+        frames[:, self.measured : self.measured + len(self._goals)] = given[:, self.measured :][:, self._goals]
         self.fill_held(frames, np.zeros(count) if times is None else np.asarray(times, dtype=float))
         self.bound(frames, found)(count)
         status = found[:, -1]
@@ -192,13 +193,14 @@ class Frame:
         self._fit, self._values = fit, fit.mechanism.values({}).copy()
         self._row, self._found = np.empty(fit.width), np.empty(fit.found)
         self._run = fit.bound(self._row, self._found)
-        free, markers = len(fit.order), 3 * fit.markers
-        self._given, self._q = self._row[:markers], self._found[:free]
-        self.places: Array = self._found[free : free + markers].reshape(-1, 3)
+        free, end = len(fit.order), len(fit.order) + 3 * fit.markers
+        self._given, self._q = self._row[: fit.measured], self._found[:free]
+        self.places: Array = self._found[free:end].reshape(-1, 3)
+        self.turns: Array = self._found[end:-3].reshape(-1, 3)
 
-    def __call__(self, positions: Array, time: float) -> Array:
-        """The values (n,) of all coordinates for places of markers (m, 3) at a time (s)."""
-        self._given[:] = positions.reshape(-1)
+    def __call__(self, measured: Array, time: float) -> Array:
+        """The values (n,) of all coordinates for places of markers and then rotations of sensors, at a time (s)."""
+        self._given[:] = measured
         self._fit.fill_held(self._row[None], np.array((time,)))
         self._run(1)
         if self._found[-1] == APART:

@@ -57,7 +57,7 @@ def sensor_frames(model: Model, mechanism: Mechanism, wanted: Iterable[str]) -> 
             found[name] = mechanism.frames[path]
     if not found:
         near = did_you_mean(wanted[0], [name for name, _ in frames]) if wanted else ""
-        raise SettingError(f"'{model.name}' has no frame for any of the sensors {listed(wanted)}{near}")
+        raise SettingError(f"'{model.name}' has no frame that is called as a sensor ({listed(wanted)}){near}")
     return found
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from osimlite.files import make_folder, written_atomically
 from osimlite.records import dataclass, field, replace
 from osimlite.simulation.files.old_storage import PRECISION, printed
-from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.files.storage import StoTable, adapter_lines
 
 
 @dataclass(eq=False)
@@ -28,7 +29,7 @@ class Outcome:
     told: list[tuple[str, str]] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
     done: bool = True
-    _texts: dict[Path, tuple[str | StoTable, str, int]] = field(default_factory=dict)
+    _texts: dict[Path, Iterable[str]] = field(default_factory=dict)
 
     def table(self, path: Path, table: StoTable, description: str = "", precision: int = PRECISION) -> None:
         """Have a table written as OpenSim prints it.
@@ -40,11 +41,16 @@ class Outcome:
             precision: digits behind the point.
         """
         self.tables[path.name] = replace(table, file=str(path))
-        self._texts[path] = table, description, precision
+        self._texts[path] = printed(table, description, precision)
+
+    def new_table(self, path: Path, table: StoTable) -> None:
+        """Have a table written in the newer form of OpenSim's storage files, with its own header."""
+        self.tables[path.name] = replace(table, file=str(path))
+        self._texts[path] = adapter_lines(table)
 
     def text(self, path: Path, content: str) -> None:
         """Have a text written."""
-        self._texts[path] = content, "", 0
+        self._texts[path] = (content,)
 
     def tell(self, name: str, words: str) -> None:
         """Say something of what came out."""
@@ -56,10 +62,9 @@ class Outcome:
         Raises:
             OsimliteError: a file cannot be written.
         """
-        for path, (content, description, precision) in self._texts.items():
+        for path, lines in self._texts.items():
             make_folder(path.parent)
             with written_atomically(path) as stream:
-                lines = printed(content, description, precision) if isinstance(content, StoTable) else (content,)
                 stream.writelines(line.encode() for line in lines)
             self.files.append(path)
         self._texts.clear()

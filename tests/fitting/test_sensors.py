@@ -125,3 +125,100 @@ def test_what_is_wrong_with_sensors_is_told(lab: Path) -> None:
     twins["/bodyset/thigh"].components.append(osimlite.PhysicalOffsetFrame(name="shank", socket_parent=".."))
     with pytest.raises(SettingError, match="several frames 'shank'"):
         place_sensors(twins, OrientationData.of({"shank_imu": eye}))
+
+
+def worn() -> osimlite.Model:
+    """The leg with sensors and markers."""
+    model = leg()
+    place_sensors(model, OrientationData.of({"thigh_imu": turned(0.1, 0.5, 0.2), "shank_imu": turned(0.0, 0.5, 0.0)}))
+    for body in list(model.components(osimlite.Body)):
+        for number, place in enumerate(((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.3))):
+            model.add(osimlite.Marker(name=f"{body.name}{number}", socket_parent_frame=body, location=place))
+    return model
+
+
+def measured(model: osimlite.Model, count: int = 8) -> tuple[Any, dict[str, Any], dict[str, Any]]:
+    """Poses (t, 7), and what sensors and markers make of them."""
+    mechanism, t = osimlite.mechanism(model), np.linspace(0.0, 1.0, count)[:, None]
+    poses = 0.4 * np.sin(3.0 * t + np.arange(7.0))
+    sensors = {
+        f"{name}_imu": np.array(
+            [quaternion(mechanism.frame_transform(f"/bodyset/{name}/{name}_imu", q)[:3, :3]) for q in poses]
+        )
+        for name in ("thigh", "shank")
+    }
+    markers: Any = list(model.components(osimlite.Marker))
+    places = {
+        item.name: np.array([mechanism.at(q).point(*mechanism.stations[item.path]) for q in poses]) for item in markers
+    }
+    return poses, sensors, places
+
+
+def test_orientations_are_fitted_and_translations_stay(lab: Path) -> None:
+    model: Any = worn()
+    height = next(item for item in model.components(osimlite.Coordinate) if item.name.endswith("4"))
+    height.default_value = 0.9
+    poses, sensors, _ = measured(model)
+    sensors["shank_imu"][3] = np.nan
+    found = osimlite.inverse_kinematics(model, orientations=sensors, times=np.arange(8) / 10)
+    assert found.sensors == ("thigh_imu", "shank_imu") and found.markers == ()
+    assert found.values[:, 3:6] == pytest.approx(np.tile((0.0, 0.9, 0.0), (8, 1)))
+    assert found.values[:, :3] == pytest.approx(poses[:, :3], abs=1e-8)
+    assert np.delete(found.values[:, 6], 3) == pytest.approx(np.delete(poses[:, 6], 3), abs=1e-8)
+    assert np.isnan(found.orientation_errors[3, 1]) and found.summary["partly_unseen"] == {"shank_imu": 0.125}
+    assert found.summary["rms_orientation_error"] < 1e-8 and found.summary["worst_sensor"] in found.sensors
+    assert found.to_xarray()["orientation_error"].dims == ("time", "sensor")
+    assert list(found.to_frame().columns) == list(found.coordinates)
+    path = lab / "trial.sto"
+    rows = np.stack([*sensors.values()], axis=1).reshape(8, -1).tolist()
+    write_sto(path, "trial", (np.arange(8) / 10).tolist(), list(sensors), rows, kind="Quaternion")
+    again = osimlite.inverse_kinematics(model, orientations=path, start=0.2, end=0.4)
+    assert again.times == pytest.approx([0.2, 0.3, 0.4])
+    assert again.values == pytest.approx(found.values[2:5], abs=1e-7)
+
+
+def test_markers_and_orientations_are_fitted_together() -> None:
+    """A sensor of weight 0 is reported and does not pull; markers tell where the model is."""
+    model = worn()
+    poses, sensors, places = measured(model)
+    sensors["thigh_imu"] = quaternion(turned(0.5, 0.0, 0.0) @ rotation_of(sensors["thigh_imu"]))
+    found = osimlite.inverse_kinematics(model, places, orientations=sensors, weights={"thigh_imu": 0.0})
+    assert found.values == pytest.approx(poses, abs=1e-8)
+    assert found.orientation_errors == pytest.approx(np.tile((0.5, 0.0), (8, 1)), abs=1e-8)
+    assert found.turns[:, 0] == pytest.approx(np.tile((-0.5, 0.0, 0.0), (8, 1)), abs=1e-8)
+    solver = osimlite.FrameSolver(model, [*places], {"thigh_imu": 0.0}, sensors=[*sensors])
+    for number, q in enumerate(poses):
+        seen = [values[number] for values in places.values()]
+        assert solver.step(seen, orientations=[one[number] for one in sensors.values()]) == pytest.approx(q, abs=1e-8)
+    assert solver.turns == pytest.approx(found.turns[-1], abs=1e-8)
+    assert solver.places == pytest.approx(found.places[-1], abs=1e-8)
+
+
+def test_the_frame_solver_takes_sensors_alone() -> None:
+    model = worn()
+    _, sensors, _ = measured(model)
+    whole = osimlite.inverse_kinematics(model, orientations=sensors)
+    solver = osimlite.FrameSolver(model, sensors=["shank_imu", "thigh_imu"])
+    for number, q in enumerate(whole.values):
+        given = np.array([sensors["shank_imu"][number], sensors["thigh_imu"][number]])
+        assert solver.step(orientations=given if number % 2 else rotation_of(given)) == pytest.approx(q, abs=1e-9)
+    with pytest.raises(SettingError, match="the orientations of 2 sensors are as many quaternions or matrices; got 1"):
+        solver.step(orientations=[[1.0, 0.0, 0.0, 0.0]])
+    with pytest.raises(SettingError, match="the positions of 0 markers"):
+        solver.step([[0.0, 0.0, 0.0]], orientations=np.eye(4)[:2])
+    with pytest.raises(SettingError, match=r"no frame that is called as a sensor \(shin_imu\); did you"):
+        osimlite.FrameSolver(model, sensors=["shin_imu"])
+
+
+def test_what_cannot_be_fitted_is_told() -> None:
+    model = worn()
+    _, sensors, places = measured(model)
+    for said, given in (
+        ("there is nothing to fit", {}),
+        (r"no frame that is called as a sensor \(foot_imu\)", {"orientations": {"foot_imu": np.eye(3)}}),
+        ("no sensor 'tigh_imu'; did you mean 'thigh_imu'", {"orientations": sensors, "weights": {"tigh_imu": 1.0}}),
+        ("is no weight", {"orientations": sensors, "weights": {"thigh_imu": -1.0}}),
+        ("8 frames of the markers and the 1 of the", {"markers": places, "orientations": {"thigh_imu": np.eye(3)}}),
+    ):
+        with pytest.raises(SettingError, match=said):
+            osimlite.inverse_kinematics(model, **given)

@@ -152,6 +152,16 @@ def _lines(times: Iterable[float], rows: Iterable[Iterable[float]], size: int) -
         yield "\t".join((number_text(time), *words)) + "\n"
 
 
+def adapter_lines(table: StoTable) -> Iterator[str]:
+    """The lines of a table as OpenSim's ``STOFileAdapter`` writes it, without the version of OpenSim."""
+    yield "".join(f"{key}={value}\n" for key, value in table.header.items())
+    yield "DataType=double\nversion=3\nendheader\n"
+    yield "\t".join(("time", *table.columns)) + "\n"
+    line = "\t".join(["%.16g"] * (len(table.columns) + 1)) + "\n"
+    for row in np.column_stack([table.times, table.rows]).tolist():
+        yield line % tuple(row)
+
+
 def number_text(value: float) -> str:
     """All digits of a number, without a needless point."""
     text = repr(float(value))

@@ -1,0 +1,128 @@
+"""A motion that fits measurements, and how far from them it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass, field
+from osimlite.schema.model import Model
+from osimlite.simulation.tabular import Tabular
+
+ADVICE = 0.02, 0.04
+"""What OpenSim's documentation calls good: a root mean square of the marker errors of less than 2 cm, and a largest one
+of less than 4 cm (m)."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedMotion(Tabular):
+    """A motion of a model that fits measured markers and orientations.
+
+    Attributes:
+        mechanism: what moves.
+        times: of the frames (t,), s.
+        values: of all n coordinates (t, n), in the mechanism's order, rad and m.
+        markers: names of the m markers that were fitted.
+        measured: where they were measured (t, m, 3), m; NaN where one was not seen.
+        places: where they are in the fitted poses (t, m, 3), m.
+        costs: what is least in each frame (t,).
+        steps: Newton steps of each frame (t,).
+        unseen: numbers of the frames in which nothing was seen: they have the pose before.
+        unsettled: numbers of the frames whose best pose was not reached.
+        model: what was fitted.
+        sensors: names of the k sensors that were fitted.
+        turns: of the sensors from where they were measured (t, k, 3), in ground, rad; NaN where one was not.
+    """
+
+    mechanism: Mechanism
+    times: Array
+    values: Array
+    markers: tuple[str, ...]
+    measured: Array
+    places: Array
+    costs: Array
+    steps: Array
+    unseen: tuple[int, ...] = ()
+    unsettled: tuple[int, ...] = ()
+    model: Model | None = field(default=None, repr=False)
+    sensors: tuple[str, ...] = ()
+    turns: Array = field(default_factory=lambda: np.empty((0, 0, 3)))
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates, in the mechanism's order."""
+        return self.mechanism.coordinate_names
+
+    @property
+    def marker_errors(self) -> Array:
+        """How far each marker is from where it was measured (t, m), m; NaN where it was not seen."""
+        return np.asarray(np.linalg.norm(self.places - self.measured, axis=2))
+
+    @property
+    def orientation_errors(self) -> Array:
+        """The angle of each sensor from where it was measured (t, k), rad; NaN where it was not."""
+        return np.asarray(np.linalg.norm(self.turns, axis=2))
+
+    @property
+    def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
+        """The coordinates over ``time``, rad and m."""
+        return {"time": self.times}, dict(zip(self.coordinates, self.values.T, strict=True))
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset: ``value`` over ``time`` and ``coordinate``, ``marker_error`` over ``time`` and ``marker``.
+
+        If there are sensors, also ``orientation_error`` over ``time`` and ``sensor``.
+
+        Raises:
+            MissingDependency: xarray is not installed.
+        """
+        from osimlite._require import require
+
+        xarray = require("xarray", extra="frame", purpose="a data set of xarray")
+        errors: dict[str, Any] = {"marker_error": (("time", "marker"), self.marker_errors)}
+        names = {"coordinate": list(self.coordinates), "marker": list(self.markers)}
+        if self.sensors:
+            errors["orientation_error"] = ("time", "sensor"), self.orientation_errors
+            names["sensor"] = list(self.sensors)
+        return xarray.Dataset(
+            {"value": (("time", "coordinate"), self.values), **errors},
+            {"time": self.times, **names},
+            {"model": self.mechanism.name},
+        )
+
+    @property
+    def in_degrees(self) -> Array:
+        """The values (t, n) with rotational coordinates in degrees, as OpenSim's files have them."""
+        turning = [info.motion_type == "rotational" for info in self.mechanism.coordinates]
+        return np.where(turning, np.rad2deg(self.values), self.values)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Root mean square and largest of each kind of errors (m, rad), where they are worst, and what was not seen."""
+        found: dict[str, Any] = {"frames": len(self.times), "markers": len(self.markers)}
+        partly: dict[str, float] = {}
+        kinds = [("marker", self.markers, self.marker_errors)]
+        if self.sensors:
+            found["sensors"] = len(self.sensors)
+            kinds.append(("orientation", self.sensors, self.orientation_errors))
+        for kind, names, errors in kinds:
+            seen = np.isfinite(errors)
+            if seen.any():
+                filled = np.where(seen, errors, -1.0)
+                frame, one = np.unravel_index(int(filled.argmax()), filled.shape)
+                noun, time = ("marker", "worst_time") if kind == "marker" else ("sensor", "worst_sensor_time")
+                found |= {
+                    f"rms_{kind}_error": float(np.sqrt(np.mean(errors[seen] ** 2))),
+                    f"largest_{kind}_error": float(filled.max()),
+                    f"worst_{noun}": names[int(one)],
+                    time: float(self.times[int(frame)]),
+                }
+            missing = (1.0 - seen.mean(axis=0)).tolist()
+            partly |= {name: round(part, 4) for name, part in zip(names, missing, strict=True) if part}
+        found["partly_unseen"] = partly
+        found["frames_unseen"], found["frames_unsettled"] = len(self.unseen), len(self.unsettled)
+        return found
