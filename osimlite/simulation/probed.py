@@ -26,10 +26,12 @@ EXTREMES: dict[str, tuple[float, Callable[[float, float], bool]]] = {
 
 
 class Extreme:
-    """The least or greatest value so far, with its sign."""
+    """The least or greatest value so far, with its sign; where nothing was integrated, OpenSim takes 0 for one."""
 
-    def __init__(self, operation: str) -> None:
+    def __init__(self, operation: str, *, is_known: bool = False) -> None:
         self._extreme, self._is_new = EXTREMES[operation]
+        if is_known:
+            self._extreme = 0.0
 
     def at(self, t: float, value: float) -> float:
         """It at a time (s)."""
@@ -78,12 +80,14 @@ def probe_rows(engine: Engine, moments: Sequence[Moment], steps: Sequence[Moment
     Args:
         engine: that computed the motion.
         moments: of the rows.
-        steps: the start of the motion and the ends of its steps.
+        steps: the start of the motion and the ends of its steps; none of a motion that is known from elsewhere.
     """
+
+    def memory_of(operation: str) -> Rate | Extreme:
+        return Rate() if operation == "differentiate" else Extreme(operation, is_known=not steps)
+
     memories = [
-        [Rate() if probe.operation == "differentiate" else Extreme(probe.operation) for _ in probe.reading.labels]
-        if has_memory([probe])
-        else []
+        [memory_of(probe.operation) for _ in probe.reading.labels] if has_memory([probe]) else []
         for probe in engine.probes
     ]
     waiting = list(reversed(steps)) if has_memory(engine.probes) else []

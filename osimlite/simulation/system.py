@@ -6,7 +6,7 @@ The stages are those of Simbody: where the links are (position), how they move (
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Self
@@ -260,6 +260,38 @@ class System:
         start = self.structure[layout.WORK_CONTROL] if path == CONTROLS else self._records_at[path]
         return float(self._w[start + place])
 
+    def places_of(self, path: str, names: Iterable[str]) -> list[int]:
+        """Where the work vector has what is known of an element, by the names of its kind."""
+        element: Any = next(item for item in self.forces.elements if item.path == path)
+        return [self._records_at[path] + element.kind.known_of[name] for name in names]
+
+    @property
+    def room(self) -> int:
+        """Length of the work vector."""
+        return len(self._w)
+
+    def looked(self, moments: Floats, places: Sequence[int], stage: int = layout.FORCE_STAGE) -> Floats:
+        """What is found at some moments, all in one call of the kernels.
+
+        Args:
+            moments: time (s) and state (k, 1 + y).
+            places: of the work vector (m,); from `room` on those of the derivative of the state.
+            stage: up to which the states are evaluated.
+
+        Raises:
+            SimulationError: one of them cannot be.
+        """
+        given, found = np.ascontiguousarray(moments, dtype=float), np.empty((len(moments), len(places)))
+        if given.shape[1] != 1 + len(self._y):
+            raise self.state.wrong_length(given.shape[1] - 1)
+        self.program.code.make_ready(("look",))
+        order = np.array([len(given), len(places), *places], dtype=np.int64)
+        parts = self.program.ints, self.numbers, self._w, self._y, self._f, stage, given, order, found
+        status = self._run(self.program.code.entry("look"), *parts)
+        if status != layout.OK:
+            raise self.refusal(status, float(self._w[layout.TIME]), self._y.tolist())
+        return found
+
     @cached_property
     def _records_at(self) -> dict[str, int]:
         pairs = zip(self.forces.elements, self._items, strict=True)
@@ -278,10 +310,15 @@ class System:
             found.append(self._w[first : first + len(probe.reading.labels)].tolist())
         return found
 
+    @property
+    def places_of_controls(self) -> range:
+        """Where the work vector has the controls of all actuators, in the order of `Controls.names`."""
+        first = int(self.structure[layout.WORK_CONTROL])
+        return range(first, first + len(self._controls.names))
+
     def controls(self) -> list[float]:
         """The controls of all actuators after an evaluation, in the order of `Controls.names`."""
-        first = self.structure[layout.WORK_CONTROL]
-        return self._w[first : first + len(self._controls.names)].tolist()
+        return self._w[self.places_of_controls].tolist()
 
     def touching(self, t: float, y: Sequence[float]) -> int:
         """The bits of the contacts that touch; sets `loads`."""

@@ -37,7 +37,8 @@ def run(job: Job, outcome: Outcome) -> None:
         outcome.done = failure is None
         if failure is not None:
             outcome.tell("ended early", failure.message)
-        motion = Motion(model, simulation, np.array(times), np.array(states))
+        steps = list(zip(times, states, strict=True))
+        motion = Motion(model, simulation, np.array(times), np.array(states), steps)
         _write(job, outcome, motion)
         analyse(job, outcome, analyses, motion)
     tell_rows(outcome, times)
@@ -64,16 +65,9 @@ def _start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[float, l
 def _write(job: Job, outcome: Outcome, motion: Motion) -> None:
     setup: ForwardTool = job.setup
     simulation, times, precision = motion.simulation, motion.times, setup.output_precision
-    mechanism, state = motion.mechanism, simulation.state
-    columns = state.auxiliary_histories(motion.states)
-    turning = np.ones(len(simulation.paths))
-    for place, info in enumerate(mechanism.coordinates):
-        for what, history in (("value", motion.values), ("speed", motion.speeds)):
-            path = f"{info.path}/{what}"
-            columns[path] = history[:, place]
-            if info.motion_type == "rotational":
-                turning[simulation.paths.index(path)] = np.degrees(1.0)
-    rows: Array = np.column_stack([columns[path] for path in simulation.paths])
+    turned = [info.path for info in motion.mechanism.coordinates if info.motion_type == "rotational"]
+    turning = [np.degrees(1.0) if path.rpartition("/")[0] in turned else 1.0 for path in simulation.paths]
+    rows: Array = np.column_stack([*motion.histories.values()])
     name = setup.name
 
     def add(ending: str, table: StoTable, description: str = "") -> None:
@@ -91,9 +85,5 @@ range {times[0]:f} {times[-1]:f}"""
     add("states_degrees.mot", StoTable(name, times, paths, rows * turning, in_degrees=True), simm)
     controls = simulation.forces.controls.names
     if controls:
-        found = []
-        for t, y in motion.moments:
-            motion.system.applied(t, y)
-            found.append(motion.system.controls())
         labels = tuple(path.rpartition("/")[2] for path in controls)
-        add("controls.sto", StoTable("controls", times, labels, np.array(found)))
+        add("controls.sto", StoTable("controls", times, labels, motion.looked(motion.system.places_of_controls)))

@@ -15,7 +15,9 @@ from osimlite.records import dataclass
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.kernels.layout import ACCELERATION_STAGE, FORCE_STAGE
 from osimlite.simulation.link_motion import LinkMotion
+from osimlite.simulation.probed import Moment
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
 from osimlite.text import did_you_mean
@@ -32,12 +34,14 @@ class Motion:
         simulation: that computes its forces and accelerations.
         times: (t,), s.
         states: (t, y), in the order of the simulation's engine.
+        steps: the start and the ends of all steps, if the motion was integrated.
     """
 
     model: Model
     simulation: Simulation
     times: Array
     states: Array
+    steps: Sequence[Moment] = ()
 
     @property
     def mechanism(self) -> Any:
@@ -70,12 +74,29 @@ class Motion:
         return self._histories[1]
 
     @cached_property
+    def histories(self) -> dict[str, Array]:
+        """All states (t,) by their paths, in OpenSim's order."""
+        columns = self.simulation.state.auxiliary_histories(self.states)
+        for place, info in enumerate(self.mechanism.coordinates):
+            columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = self.values[:, place], self.speeds[:, place]
+        return {path: columns[path] for path in self.simulation.paths}
+
+    def looked(self, places: Sequence[int], stage: int = FORCE_STAGE) -> Array:
+        """What the kernels find at every time (t, m); see :meth:`System.looked`."""
+        return self.system.looked(np.column_stack([self.times, self.states]), places, stage)
+
+    def known(self, paths: Sequence[str], *names: str) -> dict[str, Array]:
+        """What is known of force elements of some paths at every time (t, m), by the names of their kinds."""
+        places = [place for path in paths for place in self.system.places_of(path, names)]
+        found = self.looked(places).reshape(len(self.times), len(paths), len(names))
+        return {name: found[:, :, k] for k, name in enumerate(names)}
+
+    @cached_property
     def accelerations(self) -> Array:
         """Derivatives of the speeds (t, n), by all that acts on the model."""
-        engine, count = self.simulation.engine, len(self.simulation.state.order)
-        found = np.zeros_like(self.values)
-        for row, (t, y) in zip(found, self.moments, strict=True):
-            row[list(self.simulation.state.order)] = engine.derivative(t, y)[count : 2 * count]
+        order, found = list(self.simulation.state.order), np.zeros_like(self.values)
+        first = self.system.room + len(order)
+        found[:, order] = self.looked(range(first, first + len(order)), ACCELERATION_STAGE)
         return found
 
     @cached_property

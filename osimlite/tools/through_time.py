@@ -13,6 +13,7 @@ import numpy as np
 
 from osimlite._load import module_name
 from osimlite.multibody.spatial import Array
+from osimlite.records import replace
 from osimlite.schema.base import Object
 from osimlite.schema.forces import ForceSet
 from osimlite.schema.model import Model
@@ -71,7 +72,7 @@ def analyse(job: Job, outcome: Outcome, analyses: Analyses, motion: Motion, firs
         if item.step_interval > 1:
             chosen = numbers % item.step_interval == 0
             chosen[[0, -1]] = True
-            own = Motion(motion.model, motion.simulation, motion.times[chosen], motion.states[chosen])
+            own = replace(motion, times=motion.times[chosen], states=motion.states[chosen])
         module.compute(item, own, Tables(job, outcome, item.name, own.times))
 
 

@@ -160,6 +160,13 @@ class Kind:
         return {name: place for place, name in enumerate(dict.fromkeys(names))}
 
     @cached_property
+    def known_of(self) -> dict[str, int]:
+        """The same, and where "actuation" and "speed" of an actuator are, whatever they are called in its record."""
+        recorded = self.recorded
+        others = {"actuation": (self.labels or {}).get("{name}", ""), "speed": self.geometry.speed}
+        return recorded | {name: recorded[own] for name, own in others.items() if own in recorded}
+
+    @cached_property
     def text(self) -> KernelText:
         """Its kernels."""
         return KernelText(self)

@@ -251,9 +251,7 @@ def _subject(
         return (control,) * len(kind.reads), tuple(map(float, numbers._replace(factor=0.0)))
     if not isinstance(element, DeclaredForce) or not actuator.appliesForce:
         raise builder.unsupported(probe, f" of '{path}', which applies no force that is computed")
-    recorded = element.kind.recorded
-    actuation = (element.kind.labels or {}).get("{name}", "")
-    known = {**recorded, "actuation": recorded.get(actuation), "speed": recorded.get(element.kind.geometry.speed)}
+    known = element.kind.known_of
     places = []
     for name in kind.reads:
         place = known.get(name)

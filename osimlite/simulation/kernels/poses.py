@@ -4,8 +4,50 @@ from __future__ import annotations
 
 from math import nan
 
-from osimlite.simulation.kernels.layout import ITEM_AT, ITEMS, LAW, LAWS, OK, STATE_SIZE, VELOCITY_STAGE
+from osimlite.simulation.kernels.layout import (
+    ITEM_AT,
+    ITEMS,
+    LAW,
+    LAWS,
+    OK,
+    STATE_SIZE,
+    TIME,
+    VELOCITY_STAGE,
+    WORK_SIZE,
+)
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
+
+
+def look(
+    s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int, states: Floats, order: Ints, found: Floats
+) -> int:
+    """Evaluate states, up to the first that cannot be: its time is in `w` then, and itself in y.
+
+    Args:
+        s: the structure.
+        x: its numbers.
+        w: room for what is found.
+        y: room for a state.
+        f: room for its derivative.
+        stage: up to which each is evaluated.
+        states: time and state, one after another.
+        order: how many states, how many places are looked at, and these places: of w, and behind it of f.
+        found: what stands at the places, state by state.
+    """
+    size, room, count, looked = s[STATE_SIZE], s[WORK_SIZE], order[0], order[1]
+    for number in range(count):
+        given = at(states, (1 + size) * number)
+        w[TIME] = given[0]
+        for k in range(size):
+            y[k] = given[1 + k]
+        status = call(s[LAWS], s, x, w, y, f, stage)
+        if status != OK:
+            return status
+        row = at(found, looked * number)
+        for k in range(looked):
+            place = order[2 + k]
+            row[k] = w[place] if place < room else f[place - room]
+    return OK
 
 
 def watch(

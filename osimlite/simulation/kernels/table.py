@@ -67,6 +67,7 @@ LAW_MODULES = {
     "pull_points": "paths",
     "pull_each": "paths",
     "watch": "poses",
+    "look": "poses",
     "wrapped_path": "path_wraps",
     "geodesic_path": "geodesic_paths",
     "inverse": "dynamics",

@@ -1,0 +1,32 @@
+"""OpenSim's ProbeReporter: what the probes of the model report."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from osimlite.schema.probes import Probe
+from osimlite.schema.tools.analyses import ProbeReporter
+from osimlite.simulation.files.old_storage import DEGREES
+from osimlite.simulation.probed import probe_labels, probe_rows
+from osimlite.tools.motion import Motion, Tables
+from osimlite.tools.not_runnable import NotRunnable
+
+_DESCRIPTION = (
+    "\nThis file contains the probes on a model during a simulation.\n"
+    f"\nThe units used are dependent on the type of probe component\n{DEGREES}"
+)
+
+
+def compute(analysis: ProbeReporter, motion: Motion, tables: Tables) -> None:
+    """Write what the probes that are enabled report."""
+    engine, tree = motion.simulation.engine, motion.model.tree()
+    computed = {probe.path for probe in engine.probes}
+    for probe in motion.model.components(Probe):
+        if probe.enabled and tree.path_of(probe) not in computed:
+            told = f"'{analysis.name}' asks for '{probe.name}', a {type(probe).__name__} that cannot be computed"
+            raise NotRunnable(told, file=str(tables.job.file))
+    rows = np.array(list(probe_rows(engine, [*motion.moments], motion.steps))).reshape(len(motion.times), -1)
+    # Components with outputs are reported in a run, and not here.
+    shown = [issubclass(probe.component, Probe) for probe in engine.probes for _ in probe.reading.labels]
+    labels = [label for label, is_shown in zip(probe_labels(engine.probes), shown, strict=True) if is_shown]
+    tables.add("probes", "ModelProbes", labels, rows[:, shown], description=_DESCRIPTION)

@@ -1,0 +1,68 @@
+"""Analyses that report what a model has: states, actuators, probes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("scipy", reason="needs scipy (extra 'sim')")
+
+import numpy as np
+
+import osimlite
+from osimlite.models.jumper import jumper
+from osimlite.schema.actuators import BodyActuator, CoordinateActuator
+from osimlite.schema.model import Model
+from osimlite.schema.muscles import Muscle
+from osimlite.schema.probe_types import ActuatorPowerProbe
+from osimlite.simulation.files.storage import StoTable, write_sto
+from osimlite.tools.not_runnable import NotRunnable
+
+SETUP = """<OpenSimDocument Version="40600">
+    <AnalyzeTool name="it">
+        <model_file>model.osim</model_file>
+        <coordinates_file>motion.sto</coordinates_file>
+        <AnalysisSet><objects>{}</objects></AnalysisSet>
+    </AnalyzeTool>
+</OpenSimDocument>
+"""
+
+
+def tables(folder: Path, model: Model, analyses: str) -> dict[str, StoTable]:
+    """What analyses of a slow motion of a model make."""
+    osimlite.write(model, folder / "model.osim")
+    mechanism = osimlite.mechanism(model)
+    times = np.linspace(0.0, 0.2, 11)
+    rows = [[info.default_value + 0.1 * np.sin(t) for info in mechanism.coordinates] for t in times]
+    write_sto(folder / "motion.sto", "motion", times.tolist(), mechanism.coordinate_names, rows)
+    (folder / "it.xml").write_text(SETUP.format(analyses))
+    return dict(osimlite.run(folder / "it.xml").tables)
+
+
+def test_powers_are_forces_times_speeds(tmp_path: Path) -> None:
+    model = jumper()
+    turn = next(info for info in osimlite.mechanism(model).coordinates if info.motion_type == "rotational")
+    model.add(
+        CoordinateActuator(name="motor", coordinate=turn.name),
+        CoordinateActuator(name="off", coordinate=turn.name, appliesForce=False),
+        ActuatorPowerProbe(name="all", actuator_names=("all",), sum_powers_together=True),
+    )
+    made = tables(tmp_path, model, '<Actuation name="A"/><ProbeReporter name="P"/><StatesReporter name="S"/>')
+    force, speed, power = (made[f"it_A_{what}.sto"] for what in ("force", "speed", "power"))
+    muscles = [muscle.name for muscle in model.components(Muscle)]
+    assert force.columns == speed.columns == power.columns == (*muscles, "motor")
+    sense = np.array([-1.0] * len(muscles) + [1.0])
+    assert np.abs(force.rows).max() > 1.0 and np.abs(speed.rows).max() > 0.01
+    assert power.rows == pytest.approx(sense * force.rows * speed.rows, rel=1e-14)
+    assert made["it_P_probes.sto"]["all_Summed"] == pytest.approx(power.rows.sum(axis=1), rel=1e-12)
+    states = made["it_S_states.sto"]
+    assert states[f"{turn.path}/value"] == pytest.approx(turn.default_value + 0.1 * np.sin(states.times), abs=1e-9)
+    assert {path.rpartition("/")[2] for path in states.columns} >= {"value", "speed", "activation", "fiber_length"}
+
+
+def test_an_actuator_with_several_forces_is_refused(tmp_path: Path) -> None:
+    model = jumper()
+    model.add(BodyActuator(name="push", socket_body=model.body_set.objects[0]))
+    with pytest.raises(NotRunnable, match="'A' asks for one force of 'push', a BodyActuator, which has several"):
+        tables(tmp_path, model, '<Actuation name="A"/>')
