@@ -76,7 +76,10 @@ def both(folder: Path, model: Model, tool: str, more: str, cutoff: float = -1.0)
     osimlite.write(model, folder / "model.osim")
     mechanism = osimlite.mechanism(model)
     times = np.linspace(0.0, 0.5, 26)
-    rows = np.array([info.default_value + 0.15 * np.sin(5 * times + k) for k, info in enumerate(mechanism.coordinates)])
+    waves = [
+        0.0 * times if info.locked else 0.15 * np.sin(5 * times + k) for k, info in enumerate(mechanism.coordinates)
+    ]
+    rows = np.array([info.default_value + wave for info, wave in zip(mechanism.coordinates, waves, strict=True)])
     if mechanism.constraints:
         # Where constraints are to be fulfilled, OpenSim moves coordinates by 1e-5 rad off the ends of their ranges.
         ranges = [(low + 0.1, high - 0.1) for low, high in (info.range for info in mechanism.coordinates)]

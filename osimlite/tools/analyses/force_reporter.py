@@ -7,8 +7,8 @@ import numpy as np
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.tools.analyses import ForceReporter
 from osimlite.simulation.files.old_storage import UNITS
+from osimlite.tools.constraint_forces import recorded
 from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.not_runnable import NotRunnable
 
 ENERGY = "PotentialEnergy"
 _DESCRIPTION = (
@@ -19,14 +19,13 @@ _DESCRIPTION = (
 
 
 def compute(analysis: ForceReporter, motion: Motion, tables: Tables) -> None:
-    """Write the columns of every force."""
-    if analysis.include_constraint_forces and motion.simulation.constraints:
-        raise NotRunnable(
-            f"'{analysis.name}' asks for the forces of constraints, which is not done yet", file=str(tables.job.file)
-        )
+    """Write the columns of every force, and of every constraint if they are asked for."""
     engine = motion.simulation.engine
-    rows = [engine.force_records(t, y) for t, y in motion.moments]
+    rows = np.array([engine.force_records(t, y) for t, y in motion.moments]).reshape(len(motion.times), -1)
     # These energies have one label, however many there are.
     stored = {f"{force.name}.{ENERGY}" for force in motion.model.components(CoordinateLimitForce)}
     labels = [ENERGY if label in stored else label for label in engine.columns]
-    tables.add("forces", "ModelForces", labels, np.array(rows).reshape(len(rows), -1), description=_DESCRIPTION)
+    if analysis.include_constraint_forces and motion.simulation.constraints:
+        more, found = recorded(motion)
+        labels, rows = labels + more, np.hstack([rows, found])
+    tables.add("forces", "ModelForces", labels, rows, description=_DESCRIPTION)

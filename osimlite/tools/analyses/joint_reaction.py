@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from osimlite.multibody.parts import GROUND
 from osimlite.multibody.schema_frames import Placements
 from osimlite.multibody.spatial import Array
 from osimlite.schema.actuators import (
@@ -27,6 +28,7 @@ from osimlite.simulation.link_motion import LinkMotion
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
 from osimlite.text import counted, did_you_mean, listed
+from osimlite.tools.constraint_forces import ConstraintForces
 from osimlite.tools.motion import Motion, Tables
 from osimlite.tools.not_runnable import NotRunnable
 
@@ -45,10 +47,6 @@ def compute(analysis: JointReaction, motion: Motion, tables: Tables) -> None:
     joints = _joints(analysis, model, tables)
     sides = _of_each("apply_on_bodies", analysis.apply_on_bodies or ("child",), joints, tables)
     frames = _of_each("express_in_frame", analysis.express_in_frame or ("ground",), joints, tables)
-    if mechanism.constrained:
-        names = listed(mechanism.bodies[body].name for body in sorted(mechanism.constrained))
-        told = f"'{analysis.name}' asks for reactions while constraints act on {names}, which is not done yet"
-        raise NotRunnable(told, file=str(tables.job.file))
     loads = _Loads(*_overridden(analysis, motion, tables))
     columns: list[str] = []
     rows: list[Array] = []
@@ -168,7 +166,21 @@ class _Loads:
         if controls is not None:
             system.drive(controls)
         self.moved = LinkMotion.of(system, list(motion.moments), motion.accelerations[:, list(system.order)])
+        if self.mechanism.constrained:
+            for links, forces in zip(self.moved.links, ConstraintForces.along(motion), strict=True):
+                self._push(links, forces)
         self.carried = {body.mobilizer.joint: place for place, body in enumerate(self.mechanism.bodies)}
+
+    def _push(self, links: Array, forces: ConstraintForces) -> None:
+        """Let constraints push bodies (l, n), and all that carry them."""
+        for constraint, multipliers in forces.multipliers:
+            for body, wrench in zip(constraint.bodies, forces.on_bodies(constraint, multipliers), strict=True):
+                force, here = wrench[3:], forces.state.origins[body]
+                while body != GROUND:
+                    arm = here - links[body, layout.ORIGIN : layout.ORIGIN + 3]
+                    about = np.concatenate([wrench[:3] + np.cross(arm, force), force])
+                    links[body, layout.WRENCH : layout.WRENCH + 6] += about
+                    body = self.mechanism.bodies[body].parent
 
     def of(self, joint: Joint, side: str) -> tuple[Array, Array, Array]:
         """Force, moment, and the origin of the joint's frame at which they act (t, 3), in ground."""

@@ -1,0 +1,125 @@
+"""What the constraints of a model push bodies and coordinates with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from osimlite.multibody.constraints import Constraint, Coupler
+from osimlite.multibody.dynamics import SLIGHT, MassCentres
+from osimlite.multibody.kinematics import Kinematics
+from osimlite.multibody.linear import shortest
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.parts import GROUND
+from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass, replace
+from osimlite.schema import constraints as schema
+from osimlite.simulation.constrained import constraints_on
+from osimlite.tools.motion import Motion
+
+
+@dataclass(frozen=True, eq=False)
+class ConstraintForces:
+    """The forces of the constraints of a mechanism at one state.
+
+    Attributes:
+        state: at which they are, with the accelerations that they lead to.
+        multipliers: of the constraints, one number (m,) for each of the equations of each.
+    """
+
+    state: Kinematics
+    multipliers: list[tuple[Constraint, Array]]
+
+    @classmethod
+    def along(cls, motion: Motion) -> Iterator[ConstraintForces]:
+        """Those at every time of a motion.
+
+        With Gᵀ λ the bodies accelerate as they do. Of multipliers λ that do the same, as where constraints repeat each
+        other, they are the shortest, as in Simbody.
+        """
+        mechanism, system = motion.mechanism, motion.system
+        order = list(system.order)
+        kept, _ = constraints_on(mechanism, order)
+        states = zip(motion.moments, motion.values, motion.speeds, motion.accelerations, strict=True)
+        for (t, y), q, u, udot in states:
+            state = mechanism.at(q, u, t)
+            blocks = [item.acceleration_equations(state)[0] for item in kept]
+            rows, missing = np.concatenate(blocks)[:, order].T, np.array(system.missing(t, y, udot[order]))
+            # What has no mass, constraints may drive.
+            with suppress(np.linalg.LinAlgError):
+                factor = np.linalg.cholesky(MassCentres.of(state).mass_matrix()[np.ix_(order, order)])
+                rows, missing = (np.asarray(np.linalg.solve(factor, item), float) for item in (rows, missing))
+            found = shortest(rows, missing, SLIGHT * np.sqrt(rows.shape[1]))
+            parts = np.split(found, np.cumsum([len(block) for block in blocks])[:-1])
+            yield cls(state, list(zip(kept, parts, strict=True)))
+
+    def on_bodies(self, constraint: Constraint, multipliers: Array) -> Array:
+        """Moment (N m) and force (N) on each body of a constraint (k, 6), about the body's origin, in ground."""
+        bodies = constraint.bodies
+        # As if the velocities of the bodies were speeds of their own.
+        apart = np.zeros((len(self.state.origins), 6, 6 * len(bodies)))
+        for number, body in enumerate(bodies):
+            apart[body, :, 6 * number : 6 * number + 6] = np.eye(6)
+        rows, _ = constraint.acceleration_equations(replace(self.state, jacobians=apart))
+        return (multipliers @ rows).reshape(-1, 6)
+
+
+def recorded(motion: Motion) -> tuple[list[str], Array]:
+    """Labels and numbers (t, m) that OpenSim's constraints record of the forces on their bodies and mobilizers.
+
+    Forces come before moments, along the axes of the body that carries all those of a constraint. All have the opposite
+    sign of what pushes, as the multipliers of Simbody have.
+    """
+    mechanism, tree = motion.mechanism, motion.model.tree()
+    names = {tree.path_of(item): item.name for item in motion.model.components(schema.Constraint)}
+    labels: list[str] = []
+    rows = []
+    for moment, forces in enumerate(ConstraintForces.along(motion)):
+        row: list[Array] = []
+        for constraint, multipliers in forces.multipliers:
+            # Not those that hold coordinates, or close loops of joints.
+            name = names.get(constraint.name)
+            if name is None:
+                continue
+            if constraint.bodies:
+                carrier = _carrier(mechanism, constraint.bodies)
+                wrenches = forces.on_bodies(constraint, multipliers).reshape(-1, 2, 3)[:, ::-1]
+                row.append((wrenches @ forces.state.rotations[carrier]).ravel())
+                columns = [
+                    f"{_name(mechanism, body)}_{what}{axis}"
+                    for body in constraint.bodies
+                    for what in "FM"
+                    for axis in "xyz"
+                ]
+            else:
+                places = _mobilities(mechanism, constraint)
+                row.append((multipliers @ constraint.acceleration_equations(forces.state)[0])[places])
+                columns = [f"mobility_F{number}" for number in range(len(places))]
+            if moment == 0:
+                labels += [f"{name}_{column}" for column in columns]
+        rows.append(-np.concatenate([[], *row]))
+    return labels, np.array(rows)
+
+
+def _name(mechanism: Mechanism, body: int) -> str:
+    return "ground" if body == GROUND else mechanism.bodies[body].name
+
+
+def _carrier(mechanism: Mechanism, bodies: Sequence[int]) -> int:
+    """The outermost body that carries bodies, or is one of them."""
+    found = set(bodies)
+    while len(found) > 1:
+        # What stands further back is no nearer to ground than others.
+        outer = max(found)
+        found = found - {outer} | {mechanism.bodies[outer].parent}
+    return found.pop()
+
+
+def _mobilities(mechanism: Mechanism, constraint: Constraint) -> list[int]:
+    """Places of all coordinates of the joints that a coupler speaks of, its dependent coordinate last."""
+    assert isinstance(constraint, Coupler)
+    owners = {place: body.mobilizer.coordinates for body in mechanism.bodies for place in body.mobilizer.coordinates}
+    joints = dict.fromkeys(owners[place] for place in (*constraint.independent, constraint.dependent))
+    return [place for joint in joints for place in joint]
