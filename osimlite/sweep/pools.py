@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import logging
+import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
 from multiprocessing import get_context
 from queue import SimpleQueue
@@ -32,8 +34,12 @@ class ClusterLostError(OsimliteError):
     """The cluster cannot be reached any more; what was done is kept."""
 
 
+class WorkerLostError(OsimliteError):
+    """A process has ended in the midst of its work, and takes all others with it."""
+
+
 class Pool(Protocol):
-    """Takes samples, and puts what came of them into a queue.
+    """Takes work, such as samples, and puts what came of it into a queue.
 
     Attributes:
         task_seconds: how long a task should take.
@@ -43,13 +49,13 @@ class Pool(Protocol):
 
     @property
     def workers(self) -> int:
-        """How many samples can be worked on at a time; may change."""
+        """How much can be worked on at a time; may change."""
 
-    def submit(self, tag: Any, values: Floats) -> None:
-        """Have samples (k, d) run."""
+    def submit(self, tag: Any, values: Any) -> None:
+        """Have it done; the values of a sweep are samples (k, d)."""
 
-    def result(self, timeout: float | None = None) -> tuple[Any, Block]:
-        """The next tag that is done, and its block.
+    def result(self, timeout: float | None = None) -> tuple[Any, Any]:
+        """The next tag that is done, and what came of it, of samples a block.
 
         Raises:
             OsimliteError: it could not be done; TimeoutError: nothing was done in time.
@@ -73,20 +79,38 @@ def pool(plan: Plan, *, workers: int | None = None, cluster: str | None = None) 
         OsimliteError: the cluster cannot be reached.
         MissingDependency: dask.distributed is not installed.
     """
+    if cluster is None and plan.engine == "compiled":
+        with closing(ThreadPool(plan, _count(workers))) as threads:
+            yield threads
+        return
+    # What tells of a plan that cannot be run does so here.
+    Runner(plan)
+    with processes(partial(run_packed, plan.packed()), workers=workers, cluster=cluster) as made:
+        yield made
+
+
+@contextmanager
+def processes(work: Callable[[Any], Any], *, workers: int | None = None, cluster: str | None = None) -> Iterator[Pool]:
+    """Make a pool of processes, here or on a cluster, that do one thing with all that is submitted.
+
+    Args:
+        work: what is done; it can be pickled.
+        workers: processes here; by default one for each core.
+        cluster: address of a Dask scheduler.
+
+    Errors are those of :func:`pool`.
+    """
+    if cluster is not None and workers is not None:
+        raise SettingError("a cluster has the workers that were started for it; leave out --workers")
+    made: Pool = ProcessPool(work, _count(workers)) if cluster is None else ClusterPool(work, cluster)
+    with closing(made):
+        yield made
+
+
+def _count(workers: int | None) -> int:
     if workers is not None and workers < 1:
         raise SettingError(f"there is at least one worker, not {workers}")
-    made: Pool
-    if cluster is not None:
-        if workers is not None:
-            raise SettingError("a cluster has the workers that were started for it; leave out --workers")
-        made = ClusterPool(plan, cluster)
-    else:
-        count = workers or cores()
-        made = ThreadPool(plan, count) if plan.engine == "compiled" else ProcessPool(plan, count)
-    try:
-        yield made
-    finally:
-        made.close()
+    return workers or cores()
 
 
 class _LocalPool:
@@ -94,24 +118,26 @@ class _LocalPool:
 
     task_seconds = 0.25
 
-    def __init__(self, executor: ThreadPoolExecutor | ProcessPoolExecutor, work: Callable[[Floats], Block], count: int):
+    def __init__(self, executor: ThreadPoolExecutor | ProcessPoolExecutor, work: Callable[[Any], Any], count: int):
         self.workers = count
         self._executor, self._work = executor, work
         self._done: SimpleQueue[tuple[Any, Any]] = SimpleQueue()
 
-    def submit(self, tag: Any, values: Floats) -> None:
-        """Have samples run."""
-        future = self._executor.submit(self._work, values)
+    def submit(self, tag: Any, values: Any) -> None:
+        """Have it done."""
+        # Processes that begin now inherit that Ctrl-C is not for them.
+        with _sigint_held():
+            future = self._executor.submit(self._work, values)
         future.add_done_callback(lambda done: self._done.put((tag, done)))
 
-    def result(self, timeout: float | None = None) -> tuple[Any, Block]:
+    def result(self, timeout: float | None = None) -> tuple[Any, Any]:
         """The next that is done."""
         tag, future = _next(self._done, timeout)
         try:
             return tag, future.result()
         except BrokenExecutor:
             # New processes run the module anew that the program began with.
-            raise OsimliteError(
+            raise WorkerLostError(
                 "a process of the sweep has ended; a script begins a sweep under if __name__ == '__main__':, and what "
                 "was ended from outside goes on with --resume"
             ) from None
@@ -139,35 +165,32 @@ class ThreadPool(_LocalPool):
 
 
 class ProcessPool(_LocalPool):
-    """Processes, for engines that keep Python's lock."""
+    """Processes, for what keeps Python's lock."""
 
-    def __init__(self, plan: Plan, count: int) -> None:
-        packed = plan.packed()
-        Runner(plan)
-        # Windows can wait for no more.
-        executor = ProcessPoolExecutor(min(count, 61), get_context("spawn"))
-        super().__init__(executor, partial(run_packed, packed), count)
+    def __init__(self, work: Callable[[Any], Any], count: int) -> None:
+        # Windows can wait for no more. Ctrl-C is for the process that gives out the work.
+        executor = ProcessPoolExecutor(min(count, 61), get_context("spawn"), _leave_sigint)
+        super().__init__(executor, work, count)
 
 
 class ClusterPool:
     """The workers of a Dask cluster. A task that is lost with its worker is done by another.
 
     Args:
-        plan: what is run; it goes with every task, so that a new worker needs nothing from others.
+        work: what is done; it goes with every task, so that a new worker needs nothing from others.
         address: of the scheduler.
     """
 
     task_seconds = 1.0
 
-    def __init__(self, plan: Plan, address: str) -> None:
+    def __init__(self, work: Callable[[Any], Any], address: str) -> None:
         distributed = require("distributed", extra="sweep", purpose="a sweep on a cluster")
         _check_address(address)
         # It has pages to say of a scheduler that has gone, which is one sentence here.
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
-        Runner(plan)
-        self._packed, self._address = plan.packed(), address
+        self._work, self._address = work, address
         self._done: SimpleQueue[tuple[Any, Any]] = SimpleQueue()
-        self._tasks: dict[Any, tuple[Any, Floats, int, Any]] = {}
+        self._tasks: dict[Any, tuple[Any, Any, int, Any]] = {}
         self._threads, self._asked = 0, 0.0
         try:
             self._client: Any = distributed.Client(address, timeout=min(10, PATIENCE), set_as_default=False)
@@ -191,16 +214,16 @@ class ClusterPool:
             self._threads, self._asked = sum(self._client.nthreads().values()), time.monotonic()
         return max(1, self._threads)
 
-    def submit(self, tag: Any, values: Floats) -> None:
-        """Have samples run."""
+    def submit(self, tag: Any, values: Any) -> None:
+        """Have it done."""
         self._submit(tag, values, 0)
 
-    def _submit(self, tag: Any, values: Floats, losses: int) -> None:
-        future = self._client.submit(run_packed, self._packed, values, osimlite.__version__, pure=False)
+    def _submit(self, tag: Any, values: Any, losses: int) -> None:
+        future = self._client.submit(elsewhere, self._work, values, osimlite.__version__, pure=False)
         self._tasks[future.key] = tag, values, losses, future
         future.add_done_callback(self._done.put)
 
-    def result(self, timeout: float | None = None) -> tuple[Any, Block]:
+    def result(self, timeout: float | None = None) -> tuple[Any, Any]:
         """The next that is done."""
         from distributed.scheduler import KilledWorker
 
@@ -270,16 +293,42 @@ def _thread_runner(plan: Plan) -> Runner:
     return kept
 
 
-def run_packed(packed: bytes, values: Floats, version: str | None = None) -> Block:
-    """Run samples of a packed plan; what a worker of a cluster does.
+def _leave_sigint() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def _sigint_held() -> Iterator[None]:
+    """Let interruptions by the keyboard wait, where the system has masks."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def elsewhere(work: Callable[[Any], Any], values: Any, version: str) -> Any:
+    """Do work that another program gives; what a worker of a cluster does.
 
     Raises:
-        OsimliteError: this is not the version of osimlite that the plan was made by, or a sample cannot be run.
+        OsimliteError: that program has another version of osimlite, or the work cannot be done.
     """
-    if version not in (None, osimlite.__version__):
+    if version != osimlite.__version__:
         raise OsimliteError(
             f"a worker has osimlite {osimlite.__version__}, and the sweep was begun by {version}; install the same"
         )
+    return work(values)
+
+
+def run_packed(packed: bytes, values: Floats) -> Block:
+    """Run samples of a packed plan.
+
+    Raises:
+        OsimliteError: a sample cannot be run.
+    """
     if getattr(_local, "packed", None) != packed:
         _local.packed, _local.plan = packed, Plan.unpacked(packed)
     return _thread_runner(_local.plan).run(values)

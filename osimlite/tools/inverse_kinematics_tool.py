@@ -6,9 +6,10 @@ import numpy as np
 
 from osimlite.fitting.ik_tool import motion_table, run_inverse_kinematics, told
 from osimlite.fitting.marker_data import MarkerData
-from osimlite.schema.tools.inverse_kinematics import InverseKinematicsTool
+from osimlite.schema.tools.inverse_kinematics import IKMarkerTask, InverseKinematicsTool
 from osimlite.simulation.files.old_storage import UNITS
 from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.text import listed
 from osimlite.tools.job import NONE, Job
 from osimlite.tools.outcome import Outcome
 
@@ -18,7 +19,8 @@ def run(job: Job, outcome: Outcome) -> None:
     setup: InverseKinematicsTool = job.setup
     coordinates = job.path("coordinate_file")
     table = None if coordinates is None else read_sto(coordinates)
-    motion = run_inverse_kinematics(setup, job.model(), MarkerData.of(job.needed("marker_file")), table)
+    data = MarkerData.of(job.needed("marker_file"))
+    motion = run_inverse_kinematics(setup, job.model(), data, table)
     times = motion.times
     if setup.output_motion_file.strip() not in NONE:
         outcome.table(job.result(setup.output_motion_file), motion_table(motion), f"\n{UNITS}")
@@ -37,3 +39,11 @@ def run(job: Job, outcome: Outcome) -> None:
     outcome.summary |= motion.summary
     for words in told(motion):
         outcome.tell("markers", words)
+    asked = [task.name for task in setup.ik_task_set.objects if task.apply and isinstance(task, IKMarkerTask)]
+    for what, names in (
+        ("not fitted", [name for name in data.names if name not in motion.markers]),
+        ("not in the data", [name for name in asked if name not in data.names]),
+    ):
+        if names:
+            outcome.summary[what.replace(" ", "_")] = names
+            outcome.tell(what, listed(names))

@@ -21,6 +21,7 @@ class Outcome:
         summary: numbers that say how it went.
         told: the same in words: a name, and what is said of it.
         files: those that were written.
+        warnings: how many the check of the setup and of what it names gave.
         done: whether the tool did what it was asked for; what it found is written all the same.
     """
 
@@ -28,6 +29,7 @@ class Outcome:
     summary: dict[str, Any] = field(default_factory=dict)
     told: list[tuple[str, str]] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
+    warnings: int = 0
     done: bool = True
     _texts: dict[Path, Iterable[str]] = field(default_factory=dict)
 

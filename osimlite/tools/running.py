@@ -60,9 +60,12 @@ def run(setup: str | Path, output: str | Path | None = None, *, check: bool = Tr
     tag = type(top).__name__
     if not _is_there(tag):
         raise NotRunnable(f"setups of {tag} cannot be run; those of {listed(runnable())} can", file=str(file))
-    if check and (report := merged(_reports(str(file)))).errors:
-        raise FaultySetup(report)
     outcome = Outcome()
+    if check:
+        report = merged(_reports(str(file)))
+        if report.errors:
+            raise FaultySetup(report)
+        outcome.warnings = len(report.warnings)
     tool = import_module(f"{__package__}.{module_name(tag)}")
     tool.run(Job(top, file, None if output is None else Path(output)), outcome)
     outcome.write()

@@ -1,0 +1,332 @@
+"""Many setups in one go: side by side, each after those that make what it names, with a note of what is done."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
+from glob import glob, has_magic
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any
+
+from osimlite.errors import OsimliteError
+from osimlite.files import write_atomically
+from osimlite.lint.config import Config
+from osimlite.lint.engine import subject_of
+from osimlite.lint.setup import Setup
+from osimlite.records import dataclass, field
+from osimlite.sweep.pools import WorkerLostError, processes
+from osimlite.text import counted, listed
+from osimlite.tools.running import run
+
+JOURNAL = ".osimlite-run.jsonl"
+"""Where it is noted which setups are done, until all are: in the folder of the results, or where the program runs."""
+
+STATUSES = DONE, NO, FAILED, WAITED = "done", "no", "failed", "not run"
+"""How a setup ends: well, with the answer of its tool being no, with an error, or not at all since another failed."""
+
+SAVE_SECONDS = 1.0
+
+
+@dataclass
+class Trial:
+    """What became of a setup.
+
+    Attributes:
+        setup: the file.
+        status: see `DONE` and the others.
+        told: names, and what is said of each.
+        summary: numbers that say how it went.
+        files: that were written.
+        message: why it failed.
+        seconds: that it took.
+        digest: of the setup and all files that it names, as they were.
+        was_done: whether that was before this run.
+    """
+
+    setup: str
+    status: str
+    told: list[tuple[str, str]] = field(default_factory=list)
+    summary: dict[str, Any] = field(default_factory=dict)
+    files: list[str] = field(default_factory=list)
+    message: str = ""
+    seconds: float = 0.0
+    digest: str = ""
+    was_done: bool = False
+
+
+class Interrupted(OsimliteError):
+    """Stopped by the keyboard; what was done is noted."""
+
+    exit_code = 130
+
+
+def found(words: Iterable[str | Path]) -> list[Path]:
+    """Files of setups from names and patterns such as ``subjects/*/setup_ik.xml``, in order, none twice.
+
+    Raises:
+        OsimliteError: a pattern matches nothing.
+    """
+    files: dict[Path, None] = {}
+    for word in map(str, words):
+        if has_magic(word) and not Path(word).exists():
+            matches = sorted(glob(word, recursive=True))
+            if not matches:
+                raise OsimliteError(f"no file matches '{word}'")
+            files.update((Path(match), None) for match in matches if Path(match).is_file())
+        else:
+            files[Path(word)] = None
+    return list(files)
+
+
+def run_many(
+    setups: Sequence[Path],
+    output: Path | None = None,
+    *,
+    workers: int | None = 1,
+    cluster: str | None = None,
+    resume: bool = False,
+    progress: Callable[[int, int], object] | None = None,
+) -> list[Trial]:
+    """Run setups; one that fails stops none but those that need what it makes.
+
+    What they write does not depend on how many work at it.
+
+    Args:
+        setups: the files.
+        output: a folder for all results, with one in it for each setup, named after the setup's place among them.
+        workers: processes of this machine; by default all is done in this one; None for one for each core.
+        cluster: address of a Dask scheduler whose workers do it instead; they see the same files.
+        resume: leave out what an earlier run has done, if its inputs and its results are still there unchanged.
+        progress: called with how many are done, and of how many.
+
+    Returns:
+        What became of each, in their order.
+
+    Raises:
+        Interrupted: by the keyboard; the rest can be done with `resume`.
+        OsimliteError: the cluster cannot be reached.
+    """
+    journal = _Journal(output or Path(), resume, is_kept=len(setups) > 1)
+    places = _places(setups, output)
+    work = _Work(setups, journal, progress)
+    do = partial(_one, places)
+    try:
+        if cluster is None and workers == 1:
+            for setup in work.ready():
+                work.note(do(setup))
+        else:
+            work.share(do, workers, cluster)
+    except KeyboardInterrupt:
+        journal.save()
+        told = f"interrupted after {len(work.trials)} of {counted(len(setups), 'setup')}"
+        raise Interrupted(f"{told}; go on with --resume") from None
+    trials = [work.trials[setup] for setup in setups]
+    _tell_clashes(trials)
+    journal.end(trials)
+    return trials
+
+
+def _tell_clashes(trials: Sequence[Trial]) -> None:
+    """Results over which another setup has written are no results."""
+    owners: dict[str, Trial] = {}
+    for trial in trials:
+        for file in map(os.path.realpath, trial.files):
+            other = owners.setdefault(file, trial)
+            if other is not trial:
+                trial.status = FAILED
+                trial.message = f"'{other.setup}' writes '{file}' too; give each a place of its own, or -o FOLDER"
+
+
+def _places(setups: Sequence[Path], output: Path | None) -> dict[Path, Path | None]:
+    """A folder for the results of each setup; none if these go where the setup says."""
+    if output is None or len(setups) == 1:
+        return dict.fromkeys(setups, output)
+    paths = [os.path.abspath(setup) for setup in setups]
+    common = os.path.commonpath([os.path.dirname(path) for path in paths])
+    return {
+        setup: output / Path(os.path.relpath(path, common)).with_suffix("")
+        for setup, path in zip(setups, paths, strict=True)
+    }
+
+
+def _one(places: dict[Path, Path | None], setup: Path) -> Trial:
+    """Run one setup; every error of its own is part of the answer."""
+    started = time.perf_counter()
+    digest = digest_of(setup)
+    try:
+        outcome = run(setup, places[setup])
+    except OsimliteError as error:
+        return Trial(str(setup), FAILED, message=str(error), seconds=time.perf_counter() - started)
+    status = DONE if outcome.done else NO
+    files, seconds = [str(file) for file in outcome.files], time.perf_counter() - started
+    return Trial(str(setup), status, outcome.told, _plain(outcome.summary), files, seconds=seconds, digest=digest)
+
+
+def _plain(summary: dict[str, Any]) -> dict[str, Any]:
+    plain: dict[str, Any] = json.loads(json.dumps(summary, default=float))
+    return plain
+
+
+def _named(setup: str, rule: str, passed: frozenset[str] = frozenset()) -> Iterator[str]:
+    """Files that a setup, and the documents that it names, names by a rule of names."""
+    subject = subject_of(setup, Config())
+    if not isinstance(subject, Setup):
+        return
+    for item in subject.named_files("file" if rule == "file" else rule):
+        if rule == "file":
+            yield item.path
+        else:
+            folder = os.path.dirname(setup)
+            yield os.path.join(folder, item.name.strip())
+            yield os.path.join(folder, str(getattr(subject.top, "results_directory", "")).strip(), item.name.strip())
+    for item in subject.named_files("file"):
+        if item.path.lower().endswith(".xml") and item.path not in passed and os.path.isfile(item.path):
+            yield from _named(item.path, rule, passed | {setup})
+
+
+def digest_of(setup: Path) -> str:
+    """Of the contents of a setup and of all files that it names."""
+    made = blake2b(digest_size=16)
+    for path in dict.fromkeys((str(setup), *_named(str(setup), "file"))):
+        made.update(path.encode("utf-8", "surrogateescape"))
+        try:
+            made.update(Path(path).read_bytes())
+        except OSError:
+            made.update(b"\0")
+    return made.hexdigest()
+
+
+class _Journal:
+    """What is noted of the setups that are done; of one alone nothing."""
+
+    def __init__(self, folder: Path, resume: bool, *, is_kept: bool) -> None:
+        self.path, self.noted = folder / JOURNAL, dict[str, Trial]()
+        self._saved, self._is_kept = time.monotonic(), is_kept
+        if resume and self.path.is_file():
+            for line in self.path.read_text(encoding="utf-8").splitlines():
+                try:
+                    trial = Trial(**json.loads(line))
+                except (ValueError, TypeError):
+                    continue
+                self.noted[trial.setup] = trial
+
+    def done(self, setup: Path) -> Trial | None:
+        """What is noted of a setup, if all is still as it was."""
+        trial = self.noted.get(str(setup))
+        if trial is None or trial.status not in (DONE, NO) or not all(map(os.path.isfile, trial.files)):
+            return None
+        if trial.digest != digest_of(setup):
+            return None
+        trial.was_done = True
+        return trial
+
+    def note(self, trial: Trial) -> None:
+        self.noted[trial.setup] = trial
+        if time.monotonic() - self._saved > SAVE_SECONDS:
+            self.save()
+
+    def save(self) -> None:
+        """Write it, if there is anything to write."""
+        self._saved = time.monotonic()
+        if self._is_kept and self.noted and self.path.parent.is_dir():
+            lines = (json.dumps({**vars(trial), "was_done": False}) for trial in self.noted.values())
+            write_atomically(self.path, "".join(f"{line}\n" for line in lines))
+
+    def end(self, trials: Sequence[Trial]) -> None:
+        """Nothing is left to do, or something that failed may be done later."""
+        if all(trial.status in (DONE, NO) for trial in trials):
+            self.path.unlink(missing_ok=True)
+        else:
+            self.save()
+
+
+class _Work:
+    """Which setups can be run, and what became of others."""
+
+    def __init__(
+        self, setups: Sequence[Path], journal: _Journal, progress: Callable[[int, int], object] | None
+    ) -> None:
+        self.setups, self.journal, self.progress = setups, journal, progress
+        self.trials: dict[Path, Trial] = {}
+        self._needs = _needs(setups)
+        self._given: set[Path] = set()
+
+    def ready(self) -> Iterator[Path]:
+        """Setups that can be run now; those that cannot be run any more are noted."""
+        moved = True
+        while moved:
+            moved = False
+            for setup in self.setups:
+                if setup in self._given or not all(one in self.trials for one in self._needs[setup]):
+                    continue
+                moved = True
+                self._given.add(setup)
+                broken = [str(one) for one in self._needs[setup] if self.trials[one].status in (FAILED, WAITED)]
+                if broken:
+                    message = f"it needs what {listed(broken)} should have made"
+                    self.note(Trial(str(setup), WAITED, message=message))
+                elif (trial := self.journal.done(setup)) is not None:
+                    self.note(trial)
+                else:
+                    yield setup
+
+    def note(self, trial: Trial) -> None:
+        self.trials[Path(trial.setup)] = trial
+        self.journal.note(trial)
+        if self.progress is not None:
+            self.progress(len(self.trials), len(self.setups))
+
+    def share(self, do: Callable[[Path], Trial], workers: int | None, cluster: str | None) -> None:
+        """Run setups side by side. Those that were under way when a process ended are run again, each alone."""
+        alone: list[Path] = []
+        while len(self.trials) < len(self.setups):
+            under_way: list[Path] = []
+            try:
+                with processes(do, workers=workers, cluster=cluster) as pool:
+                    while len(self.trials) < len(self.setups):
+                        while len(under_way) < 2 * pool.workers and (setup := next(self.ready(), None)) is not None:
+                            pool.submit(setup, setup)
+                            under_way.append(setup)
+                        if not under_way:
+                            break
+                        setup, trial = pool.result()
+                        under_way.remove(setup)
+                        self.note(trial)
+            except WorkerLostError:
+                alone = under_way
+            for setup in alone:
+                self._alone(do, setup)
+            alone = []
+
+    def _alone(self, do: Callable[[Path], Trial], setup: Path) -> None:
+        try:
+            with processes(do, workers=1) as pool:
+                pool.submit(setup, setup)
+                self.note(pool.result()[1])
+        except WorkerLostError:
+            self.note(Trial(str(setup), FAILED, message="the process that ran it has ended, twice"))
+
+
+def _needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
+    """Which other setups make what a setup names, by the names of files in them; never two each other's."""
+    makers: dict[str, Path] = {}
+    for setup in setups:
+        makers.update((os.path.realpath(name), setup) for name in _named(str(setup), "output-file"))
+    needs: dict[Path, list[Path]] = {}
+    for setup in setups:
+        names = {os.path.realpath(name) for name in _named(str(setup), "file")}
+        needs[setup] = list({makers[name]: None for name in sorted(names & makers.keys()) if makers[name] != setup})
+    # What goes round in a circle is run in the order that was given.
+    done: set[Path] = set()
+    while len(done) < len(setups):
+        free = [setup for setup in setups if setup not in done and done.issuperset(needs[setup])]
+        if not free:
+            stuck = next(setup for setup in setups if setup not in done)
+            needs[stuck] = [one for one in needs[stuck] if one in done]
+            free = [stuck]
+        done.update(free)
+    return needs

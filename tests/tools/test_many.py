@@ -1,0 +1,203 @@
+"""Many setups in one command: their order, workers, what fails, what is interrupted and goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+
+import osimlite
+from osimlite.errors import OsimliteError
+from osimlite.simulation.files.trc import write_trc
+from osimlite.tools.many import JOURNAL, digest_of, found, run_many
+from tests.cli.command import ROOT, run
+from tests.fitting.test_inverse_kinematics import MARKERS, free_body, positions
+
+
+def make_trial(folder: Path, seed: int, frames: int = 60) -> None:
+    """Markers of a moving body, and setups that fit the motion and find its forces."""
+    folder.mkdir(parents=True)
+    times = np.linspace(0.0, 1.0, frames)
+    values = 0.3 * np.sin(3.0 * times[:, None] + np.arange(6.0) + seed)
+    write_trc(folder / "trial.trc", times.tolist(), MARKERS, positions(values).reshape(frames, -1).tolist())
+    osimlite.write(
+        osimlite.InverseKinematicsTool(
+            name="ik",
+            model_file="../model.osim",
+            marker_file="trial.trc",
+            output_motion_file="ik.mot",
+            time_range=(0.0, 1.0),
+        ),
+        folder / "z_ik.xml",
+    )
+    osimlite.write(
+        osimlite.InverseDynamicsTool(
+            name="id",
+            model_file="../model.osim",
+            coordinates_file="ik.mot",
+            output_gen_force_file="id.sto",
+            time_range=(0.0, 1.0),
+        ),
+        folder / "id.xml",
+    )
+
+
+@pytest.fixture
+def trials(tmp_path: Path) -> Path:
+    """Three trials of a model."""
+    osimlite.write(free_body(), tmp_path / "model.osim")
+    for seed in range(3):
+        make_trial(tmp_path / f"trial{seed}", seed)
+    return tmp_path
+
+
+def results(folder: Path) -> dict[str, bytes]:
+    """All results in a folder."""
+    files = [path for path in sorted(folder.rglob("*")) if path.suffix in (".mot", ".sto")]
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+def clear(folder: Path) -> None:
+    for name in results(folder):
+        (folder / name).unlink()
+
+
+def test_each_waits_for_what_it_needs_and_workers_change_no_byte(trials: Path) -> None:
+    done = run("run", "trial*/id.xml", "trial*/z_ik.xml", folder=trials)
+    assert done.code == 0 and done.out.endswith("6 setups: 6 done\n")
+    alone = results(trials)
+    assert len(alone) == 9 and not (trials / JOURNAL).exists()
+    clear(trials)
+    done = run("run", "trial*/id.xml", "trial*/z_ik.xml", "--workers", 2, "--json", folder=trials)
+    assert done.code == 0 and results(trials) == alone
+    told = json.loads(done.out)
+    assert [item["setup"] for item in told][:2] == ["trial0/id.xml", "trial1/id.xml"]
+    assert {item["status"] for item in told} == {"done"} and told[3]["summary"]["rms_marker_error"] < 1e-8
+
+
+def test_a_failure_stops_only_what_needs_it_and_is_mended_by_resuming(trials: Path) -> None:
+    file = trials / "trial1" / "trial.trc"
+    whole = file.read_text()
+    file.write_text(whole.replace("one", "eno").replace("two", "owt").replace("three", "x").replace("four", "y"))
+    done = run("run", "trial*/*.xml", folder=trials)
+    assert done.code == 2 and "6 setups: 4 done, 1 failed, 1 not run" in done.out
+    assert "needs what trial1/z_ik.xml should have made" in " ".join(done.out.split())
+    assert (trials / JOURNAL).exists()
+    file.write_text(whole)
+    # What is done is not done again, unless its inputs or its results are others.
+    times = {name: (trials / name).stat().st_mtime_ns for name in results(trials)}
+    (trials / "trial0" / "id.sto").unlink()
+    done = run("run", "trial*/*.xml", "--resume", folder=trials)
+    assert done.code == 0 and done.out.count("before") == 3 and not (trials / JOURNAL).exists()
+    kept = {name for name, before in times.items() if (trials / name).stat().st_mtime_ns == before}
+    assert kept == times.keys() - {"trial0/id.sto"}
+
+
+def test_what_is_read_makes_the_digest(trials: Path) -> None:
+    setup = trials / "trial0" / "z_ik.xml"
+    before = digest_of(setup)
+    (trials / "model.osim").write_text((trials / "model.osim").read_text().replace('"one"', '"other"', 1))
+    changed = digest_of(setup)
+    (trials / "trial0" / "trial.trc").unlink()
+    assert len({before, changed, digest_of(setup)}) == 3
+
+
+def test_a_folder_for_all_has_one_for_each(trials: Path) -> None:
+    made = run_many(found([f"{trials}/trial*/z_ik.xml"]), trials / "out")
+    assert [trial.status for trial in made] == ["done"] * 3
+    assert sorted(results(trials / "out")) == [
+        f"trial{k}/z_ik/{name}" for k in range(3) for name in ("ik.mot", "ik_ik_marker_errors.sto")
+    ]
+
+
+def test_two_that_write_one_file_are_told(trials: Path) -> None:
+    setup = trials / "trial0" / "z_ik.xml"
+    (trials / "trial0" / "again.xml").write_bytes(setup.read_bytes())
+    one, two = run_many([setup, setup.with_name("again.xml")])
+    assert one.status == "done" and two.status == "failed" and "writes" in two.message and "-o FOLDER" in two.message
+
+
+def test_names_and_patterns(trials: Path) -> None:
+    words: list[str | Path] = [trials / "trial1" / "id.xml", f"{trials}/**/id.xml"]
+    assert found(words) == [trials / f"trial{k}" / "id.xml" for k in (1, 0, 2)]
+    with pytest.raises(OsimliteError, match=r"no file matches 'nothing\*\.xml'"):
+        found(["nothing*.xml"])
+
+
+def started(folder: Path, *words: str) -> subprocess.Popen[str]:
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "80"}
+    return subprocess.Popen(
+        [sys.executable, "-m", "osimlite", "run", *words],
+        cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+
+
+def await_results(folder: Path, least: int, process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 60.0
+    while len(results(folder)) < least and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert len(results(folder)) >= least
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("how", ["keyboard", "all killed", "worker killed"])
+def test_what_is_there_is_whole_and_resuming_ends_with_the_same_bytes(trials: Path, how: str) -> None:
+    for seed in range(3, 12):
+        make_trial(trials / f"trial{seed}", seed, 400)
+    run_many(found([f"{trials}/trial*/*.xml"]))
+    whole = results(trials)
+    clear(trials)
+    process = started(trials, "trial*/*.xml", "--workers", "2")
+    await_results(trials, 4, process)
+    if how == "worker killed":
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        if not children.exists():
+            process.kill()
+            pytest.skip("no list of processes")
+        workers = [
+            pid for pid in children.read_text().split() if "spawn_main" in Path(f"/proc/{pid}/cmdline").read_text()
+        ]
+        os.kill(int(workers[0]), signal.SIGKILL)
+        out, err = process.communicate(timeout=100)
+        assert process.returncode == 0 and "Traceback" not in err and "24 done" in out
+    else:
+        os.killpg(process.pid, signal.SIGINT if how == "keyboard" else signal.SIGKILL)
+        _, err = process.communicate(timeout=100)
+        assert process.returncode == (130 if how == "keyboard" else -signal.SIGKILL) and "Traceback" not in err
+        assert how != "keyboard" or ("interrupted after" in err and "go on with --resume" in err)
+        there = results(trials)
+        assert there.items() <= whole.items()
+        done = run("run", "trial*/*.xml", "--resume", folder=trials)
+        assert done.code == 0
+    assert results(trials) == whole
+    # What is killed leaves what it was writing beside its place.
+    assert how != "keyboard" or not list(trials.rglob(".osimlite-*"))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
+def test_a_full_disk_is_told_and_leaves_no_part(trials: Path) -> None:
+    limit = 3000
+
+    def full() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    done = subprocess.run(
+        [sys.executable, "-m", "osimlite", "run", "trial0/z_ik.xml"],
+        cwd=trials, env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}, preexec_fn=full,
+        capture_output=True, text=True, check=False, timeout=100,
+    )  # fmt: skip
+    assert done.returncode == 2 and "cannot write the file" in done.stderr and "Traceback" not in done.stderr
+    assert not list((trials / "trial0").glob(".osimlite*"))
+    for name, content in results(trials).items():
+        assert content.endswith(b"\n") and len(content) <= limit, name
