@@ -9,10 +9,12 @@ from pathlib import Path
 
 import pytest
 
+import osimlite
 from osimlite.lint.settings import settings_for
 
 ROOT = Path(__file__).resolve().parents[2]
 KITS = sorted(path.parent for path in (ROOT / "docs" / "adoption").glob("*/README.md"))
+CLIENTS = sorted((ROOT / "docs" / "adoption").glob("*/client/kinematics.patch"))
 each_kit = pytest.mark.parametrize("kit", KITS, ids=lambda kit: kit.name)
 
 
@@ -34,6 +36,23 @@ def test_patches_are_sound_and_say_what_opensim_reads(kit):
         done = subprocess.run([git, "apply", "--numstat", patch], capture_output=True, text=True, check=True)
         added, removed = (sum(int(line.split("\t")[place]) for line in done.stdout.splitlines()) for place in (0, 1))
         assert 0 < added + removed < 100
+
+
+@pytest.mark.parametrize("patch", CLIENTS, ids=lambda patch: patch.parents[1].name)
+def test_clients_call_what_there_is(patch):
+    """Patches that replace OpenSim in a program: the kit names them, git reads them, and they use names of ours."""
+    git = shutil.which("git")
+    if git is None:
+        pytest.skip("needs git")
+    assert "(client/kinematics.patch)" in (patch.parents[1] / "README.md").read_text(encoding="utf-8")
+    subprocess.run([git, "apply", "--numstat", patch], capture_output=True, check=True)
+    added = [line[1:] for line in patch.read_text(encoding="utf-8").splitlines() if re.match(r"\+(?!\+\+)", line)]
+    names = set(re.findall(r"osimlite\.(\w+)", "\n".join(added)))
+    assert {"read", "read_document", "write", "run"} <= names <= set(dir(osimlite))
+    # What the setups are given is theirs.
+    given = set(re.findall(r"(?:IKTool|scaleTool|modelScaler|markerPlacer)\.(\w+)(?:\.\w+)* = ", "\n".join(added)))
+    classes = osimlite.ScaleTool, osimlite.ModelScaler, osimlite.MarkerPlacer, osimlite.InverseKinematicsTool
+    assert given <= {name for cls in classes for name in cls.model_fields} and (not given or "time_range" in given)
 
 
 @each_kit
