@@ -90,15 +90,11 @@ def recall(parts: Parts, folder: Path | None) -> Known | None:
     """
     known = _memory.get(parts.rest)
     if known is None and folder is not None:
-        try:
-            text = read_file(_file(folder, parts))
-        except OsimliteError:
-            return None
         from pydantic import TypeAdapter, ValidationError
 
         try:
-            known = TypeAdapter(Known).validate_json(text, strict=True)
-        except ValidationError:
+            known = TypeAdapter(Known).validate_json(read_file(_file(folder, parts)), strict=True)
+        except (OsimliteError, ValidationError):
             return None
         _memory[parts.rest] = known
     return known

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, dataclass_transform
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, dataclass_transform, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from osimlite.errors import MissingNameError, ModelError
 from osimlite.schema.complaints import explained, misspelt, unnamed
-from osimlite.schema.declared import Property, declare, field, properties_of
 from osimlite.schema.equality import same
 from osimlite.schema.facts import Contradiction, Facts
 from osimlite.schema.fields import Many, ObjectList, Reference, Tag, note_change
@@ -16,15 +17,19 @@ from osimlite.schema.layout import Home, Layout
 from osimlite.schema.specs import FieldSpec, defaults, field_specs, holding, numeric_names, reference_specs
 
 if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+
     from osimlite.schema.model import Model
+else:
+    ModelMetaclass = type(BaseModel)
 
 
-_SLOTS = ("__dict__", "_present", "_model", "_index", "_layout")
+_SLOTS = ("_model", "_index", "_layout")
 
 
 def none() -> Any:
     """The default of a property that holds a list of objects: none yet."""
-    return field(default_factory=ObjectList)
+    return Field(default_factory=ObjectList)
 
 
 def made(cls: type[Object], **values: Any) -> Any:
@@ -32,25 +37,17 @@ def made(cls: type[Object], **values: Any) -> Any:
 
     A value that is a function is called for every new object, so that no two defaults share a part.
     """
-    return field(
+    return Field(
         default_factory=lambda: cls.build(
             {name: value() if callable(value) else value for name, value in values.items()}, set()
         )
     )
 
 
-# A docstring of its own would stand in the place of the property.
-@dataclass_transform(kw_only_default=True, field_specifiers=(field,))
-class ObjectType(type):  # noqa: D101
-    def __init__(cls, name: str, bases: tuple[type, ...], space: dict[str, Any], **options: Any) -> None:
-        super().__init__(name, bases, space)
-        declare(cls)
-
-    @property
-    def model_fields(cls) -> dict[str, Property]:
-        """What the class and its bases declare, by attribute, those of the bases first."""
-        return properties_of(cls)
-
+# A docstring of its own would stand in the place of the property. Type checkers see the arguments of constructors only
+# if the very metaclass is decorated, not one that it derives from.
+@dataclass_transform(kw_only_default=True, field_specifiers=(Field,))
+class ObjectType(ModelMetaclass):  # noqa: D101
     @property
     def __doc__(cls) -> str | None:  # type: ignore[override]
         """The docstring of a class, and what its properties are."""
@@ -62,7 +59,7 @@ class ObjectType(type):  # noqa: D101
         return with_properties(cls, own)
 
 
-class Object(metaclass=ObjectType):
+class Object(BaseModel, metaclass=ObjectType):
     """Anything with a name and properties that an OpenSim document can hold.
 
     A subclass is declared with its properties in the order OpenSim prints them. ``tag`` gives the XML element when it
@@ -71,6 +68,10 @@ class Object(metaclass=ObjectType):
     """
 
     __slots__ = _SLOTS
+
+    model_config = ConfigDict(
+        extra="forbid", defer_build=True, validate_assignment=True, validate_default=False, protected_namespaces=()
+    )
 
     tag: ClassVar[str] = ""
     abstract: ClassVar[bool] = True
@@ -93,37 +94,18 @@ class Object(metaclass=ObjectType):
     def __init__(self, *positional: Any, **properties: Any) -> None:
         if positional:
             raise ModelError(unnamed(type(self), positional[0]))
-        known = type(self).model_fields
-        for given in properties.keys() - known.keys():
+        for given in properties.keys() - type(self).model_fields.keys():
             spec = field_specs(type(self)).get(given)
             if spec is None or spec.name in properties:
                 raise MissingNameError(misspelt(type(self), given))
             properties[spec.name] = properties.pop(given)
-        values = {name: self._checked(name, properties[name]) for name in known if name in properties}
-        self._fill({**defaults(type(self))[0], **values}, {*values})
-
-    def _checked(self, name: str, value: Any) -> Any:
-        """A value in the form in which it is stored; ModelError if it is none for this property."""
         try:
-            return type(self).model_fields[name].check(value)
-        except ValueError as error:
-            raise ModelError(explained(type(self), name, value, error)) from None
-
-    def _fill(
-        self,
-        state: dict[str, Any],
-        present: set[str],
-        index: int | None = None,
-        home: Home | Model | None = None,
-        layout: Layout | None = None,
-    ) -> Self:
-        """Take these values, which nobody else holds."""
-        _put_state(self, state)
-        _put_present(self, present)
-        put_model(self, home)
-        put_index(self, index)
-        _put_layout(self, layout)
-        return self
+            super().__init__(**properties)
+        except ValidationError as error:
+            raise ModelError(explained(type(self), error)) from None
+        _set(self, "_model", None)
+        _set(self, "_index", None)
+        _set(self, "_layout", None)
 
     @classmethod
     def build(
@@ -140,6 +122,8 @@ class Object(metaclass=ObjectType):
         self = _new(cls)
         _put_state(self, state)
         _put_present(self, present)
+        _put_extra(self, None)
+        _put_private(self, None)
         put_model(self, home)
         put_index(self, index)
         _put_layout(self, None)
@@ -147,25 +131,8 @@ class Object(metaclass=ObjectType):
 
     @classmethod
     def model_construct(cls, _fields_set: set[str] | None = None, **values: Any) -> Self:
-        """Make an instance without validation, as `build` does, of values by name."""
+        """Pydantic's way to make an instance without validation; here it is `build`."""
         return cls.build(values, set(values) if _fields_set is None else _fields_set)
-
-    @property
-    def model_fields_set(self) -> set[str]:
-        """The attributes that were given a value, by the text or in Python."""
-        return cast("set[str]", self._present)
-
-    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy, which shares its parts with the original unless it is `deep`.
-
-        Args:
-            update: what is other there, by attribute, in the form in which it is stored.
-            deep: whether nothing is shared.
-        """
-        clone = copy.deepcopy(self) if deep else copy.copy(self)
-        clone.__dict__.update(update or {})
-        clone.model_fields_set.update(update or {})
-        return clone
 
     @classmethod
     def field_specs(cls) -> dict[str, FieldSpec]:
@@ -227,8 +194,10 @@ class Object(metaclass=ObjectType):
                 raise MissingNameError(misspelt(type(self), name))
             name = spec.name
         note_change(self._model, numbers_only=name in numeric_names(type(self)))
-        self.__dict__[name] = self._checked(name, value)
-        self.model_fields_set.add(name)
+        try:
+            super().__setattr__(name, value)
+        except ValidationError as error:
+            raise ModelError(explained(type(self), error)) from None
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):
@@ -239,7 +208,7 @@ class Object(metaclass=ObjectType):
     __hash__ = None  # type: ignore[assignment]
 
     def __copy__(self) -> Self:
-        return _new(type(self))._fill({**self.__dict__}, {*self._present}, self._index, None, self._layout)
+        return cast("Self", _carry(self, super().__copy__(), self._layout))
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
         memo = {} if memo is None else memo
@@ -251,28 +220,37 @@ class Object(metaclass=ObjectType):
                 for named in _named_components(item):
                     if id(named) not in owned:
                         memo[id(named)] = named
-        memo[id(self)] = clone = _new(type(self))
-        state = copy.deepcopy(self.__dict__, memo)
-        return clone._fill(state, {*self._present}, self._index, None, copy.deepcopy(self._layout, memo))
+        clone = _carry(self, super().__deepcopy__(memo), copy.deepcopy(self._layout, memo))
+        memo[id(self)] = clone
+        return cast("Self", clone)
 
-    def __getstate__(self) -> tuple[Any, ...]:
-        return self.__dict__, self._present, self._index, None, self._layout
+    def __getstate__(self) -> dict[Any, Any]:
+        return {**super().__getstate__(), "layout": self._layout, "index": self._index}
 
-    def __setstate__(self, state: tuple[Any, ...]) -> None:
-        self._fill(*state)
+    def __setstate__(self, state: dict[Any, Any]) -> None:
+        _set(self, "_model", None)
+        _set(self, "_index", state.pop("index"))
+        _set(self, "_layout", state.pop("layout"))
+        super().__setstate__(state)
 
-    def __repr__(self) -> str:
-        shown = [f"name={self.name!r}"] if self.name else []
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        if self.name:
+            yield "name", self.name
         for spec in field_specs(type(self)).values():
             value = getattr(self, spec.name)
             if spec.name in self.model_fields_set and not isinstance(value, (list, Object)):
-                shown.append(f"{spec.name}={value!r}")
-        return f"{type(self).__name__}({', '.join(shown)})"
+                yield spec.name, value
+
+    __str__ = BaseModel.__repr__
 
 
 # Making an object by its slots' own setters is a good third faster than through setattr.
 _new = object.__new__
-_put_state, _put_present, put_model, put_index, _put_layout = (Object.__dict__[name].__set__ for name in _SLOTS)
+_put_state, _put_present, _put_extra, _put_private = (
+    BaseModel.__dict__[name].__set__
+    for name in ("__dict__", "__pydantic_fields_set__", "__pydantic_extra__", "__pydantic_private__")
+)
+put_model, put_index, _put_layout = (Object.__dict__[name].__set__ for name in _SLOTS)
 
 
 class Component(Object, abstract=True):
@@ -324,6 +302,14 @@ class Unknown(ModelComponent, abstract=True):
         return ObjectList()
 
 
+# Pydantic evaluates the annotations of all bases for every class; evaluated here once, they cost it nothing.
+for _base in (Object, Component):
+    _hints = get_type_hints(_base, include_extras=True)
+    _base.__annotations__.update({name: _hints[name] for name in _base.__annotations__})
+
+_set = object.__setattr__
+
+
 _COPYING = -1
 """Key in the memo of a deep copy that tells the outermost object has been entered; no object has this identity."""
 
@@ -358,3 +344,10 @@ def _whole(item: Object) -> dict[str, Any]:
 
 def _unknown(item: Object) -> list[str]:
     return item.layout.unknown if item.layout is not None else []
+
+
+def _carry(original: Any, clone: Any, layout: Layout | None) -> Any:
+    _set(clone, "_model", None)
+    _set(clone, "_index", original._index)
+    _set(clone, "_layout", layout)
+    return clone

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from pydantic import ValidationError
+
 if TYPE_CHECKING:
     from osimlite.schema.base import Object
 
@@ -20,11 +22,15 @@ def misspelt(cls: type[Object], name: str) -> str:
     return f"{cls.__name__} has no property '{name}'{better}"
 
 
-def explained(cls: type[Object], name: str, given: object, error: ValueError) -> str:
-    """What is wrong with the value that a property was given, in one line."""
+def explained(cls: type[Object], error: ValidationError) -> str:
+    """What pydantic found wrong with a value, in one line."""
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"]) or "?"
+    reason = first["msg"].removeprefix("Value error, ")
+    given = first.get("input")
     angle = re.fullmatch(r"\s*([-+.\d]+)\s*(deg|°)\s*", given) if isinstance(given, str) else None
     hint = f"; give the number alone, and what is in rad as math.radians({angle[1]})" if angle else ""
-    return f"{cls.__name__}.{name}: {error}{hint}"
+    return f"{cls.__name__}.{place}: {reason}{hint}"
 
 
 def unnamed(cls: type[Object], given: object) -> str:

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
+from pydantic_core import core_schema
+
 from osimlite.records import dataclass
 
 if TYPE_CHECKING:
@@ -27,13 +29,17 @@ _FIXED_SIZE: Final = {"Vec2": 2, "Vec3": 3, "Vec6": 6, "Transform": 6}
 
 
 class Kind:
-    """Base of all markers."""
+    """Base of all markers; gives pydantic a validator that never looks into the classes of other components."""
 
     __slots__ = ()
 
     def check(self, value: Any, accepts: type | None) -> Any:
         """Return `value` in the form the model stores, or raise ValueError."""
         raise NotImplementedError
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        accepts = class_in(source)
+        return core_schema.no_info_plain_validator_function(lambda value: self.check(value, accepts))
 
 
 @dataclass(frozen=True, slots=True)

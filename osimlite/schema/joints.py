@@ -6,10 +6,11 @@ The transform of M (child frame) in F (parent frame) is written X_FM; every clas
 import math
 from typing import Annotated, Any, ClassVar, Literal, Self
 
+from pydantic import Field
+
 from osimlite.errors import ModelError
 from osimlite.schema.base import ModelComponent, made, none
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.declared import field
 from osimlite.schema.facts import FLAT, NAN, Facts
 from osimlite.schema.fields import LegacyMany, Many, ObjectList, Unnamed, Vec3, real, reals, vec3
 from osimlite.schema.frames import PhysicalFrame, PhysicalOffsetFrame
@@ -84,7 +85,7 @@ class Joint(ModelComponent, abstract=True):
 
 def _coordinates(count: int) -> Any:
     """The default coordinates of a joint: `count` of them, named as OpenSim names what a file leaves out."""
-    return field(
+    return Field(
         default_factory=lambda: ObjectList(Coordinate.build({"name": f"_coord_{i}"}, set()) for i in range(count))
     )
 

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Annotated
 
+from pydantic import Field
+
 from osimlite.schema.base import made
-from osimlite.schema.declared import field
 from osimlite.schema.default_curves import active_force_length, force_velocity, passive_force_length
 from osimlite.schema.facts import (
     BELOW_QUARTER_TURN,
@@ -376,13 +377,13 @@ class RigidTendonMuscle(Muscle):
         scales={"optimal_fiber_length": "", "tendon_slack_length": ""},
     )
 
-    active_force_length_curve: Single[Function] = field(
+    active_force_length_curve: Single[Function] = Field(
         default_factory=partial(active_force_length, "active_force_length_curve")
     )
     """Active force over fiber length, both normalised."""
-    passive_force_length_curve: Single[Function] = field(
+    passive_force_length_curve: Single[Function] = Field(
         default_factory=partial(passive_force_length, "passive_force_length_curve")
     )
     """Passive force over fiber length, both normalised; kept between 0 and 10."""
-    force_velocity_curve: Single[Function] = field(default_factory=partial(force_velocity, "force_velocity_curve"))
+    force_velocity_curve: Single[Function] = Field(default_factory=partial(force_velocity, "force_velocity_curve"))
     """Factor of the active force over fiber velocity, normalised."""

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Annotated
 
-from osimlite.schema.declared import field
+from pydantic import Field
+
 from osimlite.schema.default_curves import (
     active_force_length,
     force_velocity,
@@ -69,15 +70,15 @@ class Schutte1993Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     """Rate of falling activation, per time scale; also part of the rise."""
     damping: Annotated[float, real(domain=">= 0")] = 0.1
     """Damping force of the fiber over `max_isometric_force`, per normalised velocity."""
-    tendon_force_length_curve: Single[Function] = field(
+    tendon_force_length_curve: Single[Function] = Field(
         default_factory=partial(tendon_force_length, "tendon_force_length_curve")
     )
     """Force of the tendon over its strain."""
-    active_force_length_curve: Single[Function] = field(
+    active_force_length_curve: Single[Function] = Field(
         default_factory=partial(active_force_length, "active_force_length_curve")
     )
     """Active force over fiber length, both normalised."""
-    passive_force_length_curve: Single[Function] = field(
+    passive_force_length_curve: Single[Function] = Field(
         default_factory=partial(passive_force_length, "passive_force_length_curve")
     )
     """Passive force over fiber length, both normalised."""
@@ -96,11 +97,11 @@ class Delp1990Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     """Rate of falling activation, per time scale; also part of the rise."""
     mass: Annotated[float, real(domain="> 0", legacy=True)] = 0.00287
     """Mass between fiber and tendon, normalised by force, time scale and optimal fiber length."""
-    tendon_force_length_curve: LegacyOptional[Function] = field(default_factory=tendon_force_length)
+    tendon_force_length_curve: LegacyOptional[Function] = Field(default_factory=tendon_force_length)
     """Force of the tendon over its strain."""
-    active_force_length_curve: LegacyOptional[Function] = field(default_factory=active_force_length)
+    active_force_length_curve: LegacyOptional[Function] = Field(default_factory=active_force_length)
     """Active force over fiber length, both normalised."""
-    passive_force_length_curve: LegacyOptional[Function] = field(default_factory=passive_force_length)
+    passive_force_length_curve: LegacyOptional[Function] = Field(default_factory=passive_force_length)
     """Passive force over fiber length, both normalised."""
-    force_velocity_curve: LegacyOptional[Function] = field(default_factory=force_velocity)
+    force_velocity_curve: LegacyOptional[Function] = Field(default_factory=force_velocity)
     """Factor of the active force over fiber velocity, normalised."""
