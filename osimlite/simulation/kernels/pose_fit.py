@@ -56,8 +56,8 @@ VAGUE, ALIKE = 1e-7, 1e-7
 others follow, so that this is not so."""
 SMALL_STEPS = 1e-2
 """Damping of the first step where the way down is to be followed closely."""
-PATIENCE = 15
-"""After how many steps the whole second derivative is taken where poses look alike."""
+PATIENCE = 8
+"""After how many steps the whole second derivative is taken, also where poses look alike or steps are short."""
 POSES = 2
 """How many poses are kept to go on from."""
 INWARDS = 0.3
@@ -309,13 +309,13 @@ def descend(
             before = length if damping == lightest else inf
             damping = max(0.1 * damping, lightest)
             # Where poses look alike the whole second derivative comes last: far from the best it leads astray.
-            bends = damping < FIRST_DAMPING and (lightest == LIGHTEST or steps >= PATIENCE)
+            bends = steps >= PATIENCE or (damping < FIRST_DAMPING and lightest == LIGHTEST)
         else:
             if length <= 10.0 * FINEST:
                 # No better pose can be told from this one.
                 status = FITTED
                 break
-            damping, bends, before = max(10.0 * damping, FIRST_DAMPING), False, inf
+            damping, bends, before = max(10.0 * damping, FIRST_DAMPING), steps >= PATIENCE, inf
             if damping > HEAVIEST:
                 break
             cost(m, y)
