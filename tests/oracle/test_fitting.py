@@ -13,10 +13,16 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.fitting.ik_tool import run_inverse_kinematics, tasks_of
+from osimlite.fitting.inverse_kinematics import marker_stations
+from osimlite.fitting.marker_data import MarkerData
+from osimlite.fitting.pose_layout import Marker
 from osimlite.fitting.scaling import scale_model
 from osimlite.simulation.files.storage import read_sto
 from osimlite.simulation.files.trc import write_trc
+from tests.fitting.test_pose_fit import cost_of
 from tests.fitting.test_scaling import assert_same
+from tests.tools.test_fitting_tools import unpacked
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -35,6 +41,7 @@ for name, (x, y, z) in json.loads(sys.argv[1]).items():
 model.scale(state, factors, sys.argv[3] == "True", float(sys.argv[2]))
 model.printToXML("theirs.osim")
 """
+QUIET = "opensim.Logger.setLevelString('Off')"
 FIT = """
 import sys, opensim
 opensim.Logger.setLevelString("Off")
@@ -142,3 +149,43 @@ def test_minima_are_those_of_opensim(kind: str, tmp_path: Path) -> None:
     if kind != "clamped":
         # IPOPT keeps clamped coordinates, and the others with them, off the ends of their ranges.
         assert ours.in_degrees == pytest.approx(theirs.rows, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("case", "setup", "model"),
+    [
+        ("ik_gait10", "walk_Setup_IK.xml", "gait10_subject01"),
+        ("ik_id_gait2354", "subject01_Setup_IK.xml", "gait2354_subject01_simbody"),
+    ],
+)
+def test_public_setups_at_the_best_accuracy(
+    shared: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, case: str, setup: str, model: str
+) -> None:
+    """What OpenSim's optimizer still finds is the minimum, whose cost is the least in every frame."""
+    monkeypatch.chdir(tmp_path)
+    source = shared / "oracle" / "tools" / "reference"
+    tool: Any = osimlite.read_document(source / case / setup)
+    trial = Path(tool.marker_file.strip()).name
+    unpacked(source / case / trial, tmp_path, trial)
+    unpacked(source / "models" / f"{model}.osim", tmp_path, "model.osim")
+    tool.model_file, tool.marker_file, tool.output_motion_file = "model.osim", trial, "theirs.mot"
+    tool.results_directory, tool.accuracy = ".", 1e-9
+    osimlite.write(tool, tmp_path / "setup.xml")
+    ask(f"import opensim; {QUIET}; opensim.InverseKinematicsTool('setup.xml').run()", tmp_path)
+    theirs, data = read_sto(tmp_path / "theirs.mot"), MarkerData.of(trial).between(*tool.time_range)
+    subject = osimlite.read("model.osim")
+    ours = run_inverse_kinematics(tool, subject, data)
+    mechanism = ours.mechanism
+    assert theirs.columns == ours.coordinates and not ours.unsettled
+    assert ours.in_degrees == pytest.approx(theirs.rows, abs=2e-5)
+    tasks = tasks_of(subject, mechanism, tool.ik_task_set.objects, data, None)
+    stations = marker_stations(subject, mechanism)
+    markers = [Marker(stations[name], weight) for name, weight in tasks.weights.items()]
+    turning = [info.motion_type == "rotational" for info in mechanism.coordinates]
+    poses = np.where(turning, np.deg2rad(theirs.rows), theirs.rows)
+    for q, measured, wanted, cost in zip(poses, ours.measured, tasks.wanted, ours.costs, strict=True):
+        goals = [
+            0.5 * goal.weight * (q[goal.coordinate] - value) ** 2
+            for goal, value in zip(tasks.goals, wanted, strict=True)
+        ]
+        assert cost <= cost_of(mechanism, markers, measured, q) + sum(goals) + 1e-15
