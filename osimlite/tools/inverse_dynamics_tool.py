@@ -6,11 +6,15 @@ import numpy as np
 
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.schema.joints import Joint, ScapulothoracicJoint
+from osimlite.schema.model import Model
 from osimlite.schema.tools.dynamics import InverseDynamicsTool
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.files.recorded import RecordedMotion, exclude_forces
 from osimlite.simulation.files.storage import StoTable
+from osimlite.text import did_you_mean
 from osimlite.tools.job import Job
+from osimlite.tools.joint_loads import loads_at_joints
 from osimlite.tools.not_runnable import NotRunnable
 from osimlite.tools.outcome import Outcome
 
@@ -18,11 +22,9 @@ from osimlite.tools.outcome import Outcome
 def run(job: Job, outcome: Outcome) -> None:
     """Compute the generalized forces."""
     setup: InverseDynamicsTool = job.setup
-    if setup.joints_to_report_body_forces:
-        told = "joints_to_report_body_forces asks for loads on bodies at joints, which are not computed yet"
-        raise NotRunnable(told, file=str(job.file))
     model = job.model()
-    recorded = RecordedMotion.read(build_mechanism(model), job.needed("coordinates_file"))
+    joints = _joints(job, model, outcome)
+    recorded = RecordedMotion.read(build_mechanism(model, opensim_derivatives=True), job.needed("coordinates_file"))
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:
         # OpenSim takes what its filter adds for part of the motion.
@@ -32,6 +34,11 @@ def run(job: Job, outcome: Outcome) -> None:
     forces = force_elements(model, recorded.mechanism, external_loads=job.path("external_loads_file"), folder=None)
     table = recorded.inverse_dynamics(forces)
     outcome.table(job.in_results(setup.output_gen_force_file), table)
+    if joints:
+        found = np.empty_like(table.rows)
+        found[:, [place for body in recorded.mechanism.bodies for place in body.mobilizer.coordinates]] = table.rows
+        loads = loads_at_joints(model, joints, recorded, found)
+        outcome.table(job.in_results(setup.output_body_forces_file), loads)
     outcome.tell("largest", f"{np.abs(table.rows).max():.6g}")
     _tell_residuals(outcome, recorded.mechanism, table)
 
@@ -54,3 +61,27 @@ def _tell_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -> 
             outcome.summary |= {f"rms_residual_{what}": rms, f"largest_residual_{what}": most}
             part = f", {100.0 * most / weight:.3g} % of the weight" if what == "force" and weight else ""
             outcome.tell(f"residual {what}s", f"{rms:.4g} {unit} (root mean square), at most {most:.4g} {unit}{part}")
+
+
+def _joints(job: Job, model: Model, outcome: Outcome) -> list[Joint]:
+    """The joints whose loads are asked for; OpenSim warns of those that are not there.
+
+    Raises:
+        NotRunnable: one is a ScapulothoracicJoint, which OpenSim makes of two.
+    """
+    known = {joint.name: joint for joint in model.joint_set.objects}
+    found: list[Joint] = []
+    for name in map(str, job.setup.joints_to_report_body_forces):
+        if name.upper() == "ALL":
+            found += known.values()
+            break
+        if name in known:
+            found.append(known[name])
+        else:
+            told = f"there is no joint '{name}'{did_you_mean(name, known)}: its loads are left out, as in OpenSim"
+            outcome.tell("joints_to_report_body_forces", told)
+    for joint in found:
+        if isinstance(joint, ScapulothoracicJoint):
+            told = f"'{joint.name}' is a ScapulothoracicJoint, whose loads cannot be reported yet; leave it out"
+            raise NotRunnable(told, file=str(job.file))
+    return found

@@ -77,9 +77,13 @@ class Job:
         return self._put(Path(name), self.file.parent)
 
     def in_results(self, name: str) -> Path:
-        """Where a file of results goes: into the `results_directory`, of which OpenSim makes the last part only."""
-        folder = self.setup.results_directory.strip()
-        return self._put(Path(name), self.file.parent / ("" if folder in NONE else folder))
+        """Where a file of results goes: into the `results_directory`, of which OpenSim makes the last part only.
+
+        Folders in its name do not count, and without an ending it is a .sto.
+        """
+        folder, last = self.setup.results_directory.strip(), Path(name).name
+        own = Path(last if "." in last else f"{last}.sto")
+        return self._put(own, self.file.parent / ("" if folder in NONE else folder))
 
     def _put(self, name: Path, folder: Path) -> Path:
         return folder / name if self.output is None else self.output / name.name

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -167,6 +166,6 @@ class Tables:
             of: what stands before the suffix in the file's name, if not the analysis alone.
         """
         setup = self.job.setup
-        path: Path = self.job.in_results(f"{setup.name}_{self.name}{of}_{suffix}.sto")
+        path = self.job.in_results(f"{setup.name}_{self.name}{of}_{suffix}")
         table = StoTable(title, self.times, tuple(columns), rows, in_degrees)
         self.outcome.table(path, table, description, setup.output_precision)

@@ -52,7 +52,7 @@ ANALYSES = """
                     <point_name>tip</point_name>
                     <point>0.1 0.02 0.03</point>
                 </PointKinematics>
-                <PointKinematics name="Q">
+                <PointKinematics name="Q.1">
                     <body_name>{body}</body_name>
                     <relative_to_body_name>{frame}</relative_to_body_name>
                     <point_name>tip</point_name>
@@ -76,14 +76,16 @@ def both(folder: Path, model: Model, tool: str, more: str, cutoff: float = -1.0)
     osimlite.write(model, folder / "model.osim")
     mechanism = osimlite.mechanism(model)
     times = np.linspace(0.0, 0.5, 26)
-    waves = [
-        0.0 * times if info.locked else 0.15 * np.sin(5 * times + k) for k, info in enumerate(mechanism.coordinates)
-    ]
-    rows = np.array([info.default_value + wave for info, wave in zip(mechanism.coordinates, waves, strict=True)])
-    if mechanism.constraints:
+    infos = mechanism.coordinates
+    rows = np.array(
+        [info.default_value + 0.15 * np.sin(5 * times + k) * (not info.locked) for k, info in enumerate(infos)]
+    )
+    if mechanism.constraints and tool != "InverseDynamicsTool":
         # Where constraints are to be fulfilled, OpenSim moves coordinates by 1e-5 rad off the ends of their ranges.
-        ranges = [(low + 0.1, high - 0.1) for low, high in (info.range for info in mechanism.coordinates)]
-        rows = np.array([np.clip(row, *ends) for row, ends in zip(rows, ranges, strict=True)])
+        low, high = np.array([info.range for info in infos]).T[:, :, None]
+        starts = np.clip(rows[:, :1], low + 0.2, high - 0.2)
+        moved = np.clip(rows + starts - rows[:, :1], low + 0.1, high - 0.1)
+        rows = np.where(np.array([[info.locked] for info in infos]), rows, moved)
         rows = np.array([mechanism.assemble(q) for q in rows.T]).T
     turns = [info.motion_type == "rotational" for info in mechanism.coordinates]
     write_sto(
@@ -130,6 +132,25 @@ def test_inverse_dynamics(corpus: Any, tmp_path: Path, monkeypatch: pytest.Monke
     model = osimlite.read(real(corpus, "m0001"))
     more = "<forces_to_exclude>Muscles</forces_to_exclude>"
     compare(*both(tmp_path, model, "InverseDynamicsTool", more, cutoff), 1e-8, 1.5e-8)
+
+
+LOADS = """<forces_to_exclude>Muscles</forces_to_exclude>
+    <joints_to_report_body_forces>{joints}</joints_to_report_body_forces>
+    <output_gen_force_file>not/here/forces</output_gen_force_file>
+    <output_body_forces_file>loads.1</output_body_forces_file>"""
+
+
+@pytest.mark.parametrize(
+    ("name", "joints"),
+    [("m0001", "r_shoulder nowhere r_shoulder"), ("m0954", "ALL"), ("m0013", "all"), ("jumper", "ALL")],
+)
+def test_loads_at_joints(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, joints: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    model = jumper() if name == "jumper" else osimlite.read(real(corpus, name))
+    ours, theirs = both(tmp_path, model, "InverseDynamicsTool", LOADS.format(joints=joints))
+    assert sorted(path.name for path in theirs.iterdir()) == ["forces.sto", "loads.1"]
+    largest = max(np.abs(read_sto(file).rows).max() for file in theirs.iterdir())
+    compare(ours, theirs, 1e-8, 1.5e-8 + 1e-12 * largest)
 
 
 MORE = """<Kinematics name="K"/><BodyKinematics name="B"/>

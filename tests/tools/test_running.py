@@ -106,7 +106,6 @@ def test_times_and_files_that_mean_nothing(setup: Path) -> None:
     for old, new, said in (
         ("0.02 0.1", "0.1 0.02", "give the first time first"),
         ("walker.osim", "", "it names no model_file"),
-        ("<time_range>", "<joints_to_report_body_forces>ALL</joints_to_report_body_forces><time_range>", "not"),
     ):
         setup.write_text(SETUP.replace(old, new))
         with pytest.raises(OsimliteError, match=said):

@@ -25,12 +25,12 @@ from osimlite.simulation.files.storage import read_sto
 from osimlite.simulation.given_controls import driven
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.link_motion import LinkMotion
-from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
 from osimlite.text import counted, did_you_mean, listed
 from osimlite.tools.constraint_forces import ConstraintForces
 from osimlite.tools.motion import Motion, Tables
 from osimlite.tools.not_runnable import NotRunnable
+from osimlite.tools.through_time import simulation_of
 
 _TITLE = "Joint Reaction Loads"
 _DESCRIPTION = (
@@ -134,10 +134,7 @@ def _overridden(analysis: JointReaction, motion: Motion, tables: Tables) -> tupl
             told = f"the {type(item).__name__} '{item.name}' cannot push as '{path}' says, which is not done yet"
             raise NotRunnable(told, file=str(tables.job.file))
         model.force_set.objects[places[id(item)]] = ideal
-    job = tables.job
-    simulation = Simulation(
-        model, "compiled", external_loads=job.path("external_loads_file"), folder=job.needed("model_file").parent
-    )
+    simulation = simulation_of(tables.job, model)
     forces = {item.name: (table.times, table[item.name]) for item in actuators}
     controls = driven(simulation.forces.controls, forces, float(motion.times[-1]))
     simulation.engine.drive(controls)
