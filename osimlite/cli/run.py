@@ -74,13 +74,14 @@ def _codes(trials: list[Trial]) -> list[int]:
 
 
 def _run_one(setup: Path, output: Path | None) -> int:
+    from osimlite.lint.diagnostic import Report
     from osimlite.tools.running import FaultySetup
     from osimlite.tools.running import run as run_setup
 
     try:
-        outcome = run_setup(setup, output)
+        outcome = run_setup(setup, output, tell=_show_findings)
     except FaultySetup as fault:
-        _show_findings(fault.report)
+        _show_findings(Report(fault.report.errors, fault.report.texts))
         raise
     _show(setup, outcome)
     return 0 if outcome.done else 1
@@ -88,10 +89,9 @@ def _run_one(setup: Path, output: Path | None) -> int:
 
 def _show_findings(report: Report) -> None:
     from osimlite.cli._console import show, wants_colour
-    from osimlite.lint.diagnostic import Report
     from osimlite.lint.reporters import render
 
-    show(render(Report(report.errors, report.texts), "concise", colour=wants_colour()), err=True)
+    show(render(report, "concise", colour=wants_colour()), err=True)
 
 
 def _show(setup: Path, outcome: Outcome) -> None:

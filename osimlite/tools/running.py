@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -39,13 +39,21 @@ class FaultySetup(DocumentError):
 
 
 @collector_paused()
-def run(setup: str | Path, output: str | Path | None = None, *, check: bool = True) -> Outcome:
+def run(
+    setup: str | Path,
+    output: str | Path | None = None,
+    *,
+    check: bool = True,
+    tell: Callable[[Report], None] | None = None,
+) -> Outcome:
     """Run the setup of a tool as OpenSim would, and write the files that it would write.
 
     Args:
         setup: the file.
         output: a folder for all results, in place of where the setup puts them.
         check: whether the setup and all that it names but the model are checked first.
+        tell: is told, before anything is computed, what is misspelt in the setup although the tool runs with it, such
+            as a marker or a sensor that is left out then.
 
     Returns:
         The tables that were written, as they were before they were rounded to the digits of the files, and a summary.
@@ -66,6 +74,9 @@ def run(setup: str | Path, output: str | Path | None = None, *, check: bool = Tr
         if report.errors:
             raise FaultySetup(report)
         outcome.warnings = len(report.warnings)
+        misspelt = [found for found in report.warnings if found.file == str(file) and found.suggestion is not None]
+        if tell is not None and misspelt:
+            tell(Report(misspelt, report.texts))
     tool = import_module(f"{__package__}.{module_name(tag)}")
     tool.run(Job(top, file, None if output is None else Path(output)), outcome)
     outcome.write()

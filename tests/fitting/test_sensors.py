@@ -15,6 +15,7 @@ from osimlite.fitting.orientation_data import OrientationData
 from osimlite.fitting.sensors import place_sensors
 from osimlite.multibody.spatial import quaternion, rotation_about_space, rotation_of, rotation_xyz
 from osimlite.simulation.files.storage import write_sto
+from osimlite.simulation.files.trc import write_trc
 from tests.cli.command import run
 
 PLACER = """<OpenSimDocument Version="40600">
@@ -249,3 +250,47 @@ def test_frames_with_many_sensors_missing_reach_their_best_pose(corpus: Any, tmp
     values[(rng.random(frames) < 0.3)[:, None] & (rng.random(values.shape[:2]) < 0.2)] = np.nan
     found = osimlite.inverse_kinematics(model, orientations=dict(zip(names, np.swapaxes(values, 0, 1), strict=True)))
     assert not found.unsettled and found.steps.max() < 120
+
+
+TRACKER = """<OpenSimDocument Version="40600">
+    <IMUInverseKinematicsTool name="it">
+        <model_file>worn.osim</model_file>
+        <orientations_file>standing.sto</orientations_file>
+        <OrientationWeightSet name="orientation_weights">
+            <objects>
+                <OrientationWeight name="tigh_imu"><weight>2</weight></OrientationWeight>
+            </objects>
+        </OrientationWeightSet>
+        <results_directory>out</results_directory>
+    </IMUInverseKinematicsTool>
+</OpenSimDocument>
+"""
+
+
+def test_a_misspelt_weight_is_told_with_its_line_before_the_run(lab: Path) -> None:
+    osimlite.write(worn(), lab / "worn.osim")
+    (lab / "tracker.xml").write_text(TRACKER)
+    done = run("run", "tracker.xml", folder=lab)
+    assert done.code == 0 and "tracker.xml:7:" in done.err and "'thigh_imu'" in done.err, done.err
+    assert "2 sensors: errors of 0.00 degrees" in done.out
+    assert sorted(path.name for path in (lab / "out").iterdir()) == [
+        "ik_standing.mot", "ik_standing_orientationErrors.sto",
+    ]  # fmt: skip
+    (lab / "tracker.xml").write_text(TRACKER.replace("tigh_imu", "thigh_imu").replace("standing.sto", "standin.sto"))
+    done = run("run", "tracker.xml", folder=lab)
+    assert done.code == 2 and "tracker.xml:4:" in done.err
+
+
+def test_a_misspelt_marker_is_told_with_its_line_before_the_run(lab: Path) -> None:
+    osimlite.write(worn(), lab / "worn.osim")
+    _, _, places = measured(worn())
+    rows = np.stack([*places.values()], axis=1).reshape(8, -1).tolist()
+    write_trc(lab / "trial.trc", [0.1 * k for k in range(8)], [*places], rows)
+    tool = osimlite.InverseKinematicsTool(
+        name="ik", model_file="worn.osim", marker_file="trial.trc", output_motion_file="ik.mot", time_range=(0.0, 0.5)
+    )
+    tool.ik_task_set.objects = [osimlite.IKMarkerTask(name=name, weight=1.0) for name in [*places, "thihg0"]]
+    osimlite.write(tool, lab / "ik.xml")
+    line = (lab / "ik.xml").read_text().split("thihg0")[0].count("\n") + 1
+    done = run("run", "ik.xml", folder=lab)
+    assert done.code == 0 and f"ik.xml:{line}:" in done.err and "thihg0" in done.err, done.err
