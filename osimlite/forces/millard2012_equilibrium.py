@@ -68,7 +68,7 @@ def millard2012_equilibrium(
     inverse_curve: Sequence[float],
     passive_curve: Sequence[float],
     tendon_curve: Sequence[float],
-) -> tuple[float, float, float, float, float, float, float, float, bool, float, float]:
+) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
     """The muscle at a moment; see calcFiberVelocityInfo and calcMuscleDynamicsInfo of OpenSim's class.
 
     Fibers at their least length stay there as long as they would shorten, and bear nothing then. A rigid tendon does
@@ -90,7 +90,7 @@ def millard2012_equilibrium(
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by length and by
         velocity, active and passive fiber force (N), whether a fiber velocity was found, rate of activation (1/s),
-        fiber velocity (m/s).
+        fiber velocity (m/s), what of the passive force is not by damping (N).
     """
     active = min(max(excitation if m.is_excited else activation, m.least), 1.0)
     fiber = fiber_length
@@ -116,9 +116,10 @@ def millard2012_equilibrium(
             by_velocity = (tendon / cos - elastic) / (active * by_length)
             velocity, _ = curve_value(inverse_curve, by_velocity)
     pull = m.strength * (active * by_length * by_velocity)
-    passive = m.strength * elastic + m.strength * m.damping * velocity
+    spring = m.strength * elastic
+    passive = spring + m.strength * m.damping * velocity
     if fiber <= m.smallest and velocity <= 0.0:
-        velocity, by_velocity, pull, passive = 0.0, 1.0, 0.0, 0.0
+        velocity, by_velocity, pull, spring, passive = 0.0, 1.0, 0.0, 0.0, 0.0
     if m.is_rigid:
         passive = max(passive, -pull)
         tension = (pull + passive) * cos
@@ -126,7 +127,7 @@ def millard2012_equilibrium(
         tension = tendon * m.strength
     change = first_order_activation_rate(excitation, activation, m.rising, m.falling, m.least)
     speed = velocity * m.fastest * m.optimal
-    return tension, active, fiber, cos, by_length, by_velocity, pull, passive, is_found, change, speed
+    return tension, active, fiber, cos, by_length, by_velocity, pull, passive, is_found, change, speed, spring
 
 
 def damped_velocity(

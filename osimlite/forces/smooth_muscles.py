@@ -143,7 +143,7 @@ def degroote(
     normalized_tendon_force: float,
     m: SmoothMuscle,
     tendon: SmoothTendon,
-) -> tuple[float, float, float, float, float, float, float, float, float, float, float, float]:
+) -> tuple[float, float, float, float, float, float, float, float, float, float, float, float, float]:
     """De Groote's muscle at a moment; see DeGrooteFregly2016Muscle of OpenSim.
 
     As in OpenSim, damping of the fibers is not in the rate of the tendon's force: with an elastic tendon it changes
@@ -161,7 +161,7 @@ def degroote(
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by length and by
         velocity, active and passive fiber force (N), rates of activation and of the normalized tendon force (1/s),
-        fiber velocity (m/s), energy (J).
+        fiber velocity (m/s), what of the passive force is not by damping (N), energy (J).
     """
     a = activation if m.follows else excitation
     tendon_length = smooth_tendon_length(normalized_tendon_force, tendon.growth) if tendon.elastic else 1.0
@@ -181,6 +181,7 @@ def degroote(
         velocity = rate * cos / fastest
         factor = degroote_factor(velocity)
     active_force = m.strength * a * active * factor
+    spring = m.strength * passive
     passive_force = m.strength * (passive + m.damping * velocity)
     tension = (active_force + passive_force) * cos
     if tendon.elastic:
@@ -188,7 +189,7 @@ def degroote(
         energy += m.strength * m.slack * (normalized_tendon_force / tendon.growth - BELOW * (tendon_length - 1.0))
     activation_rate = smooth_activation_rate(excitation, a, m.rising, m.falling, m.sharpness)
     fibers = fiber_length, cos, active, factor, active_force, passive_force
-    return tension, a, *fibers, activation_rate, force_rate, velocity * fastest, energy
+    return tension, a, *fibers, activation_rate, force_rate, velocity * fastest, spring, energy
 
 
 def degroote_equilibrium(
@@ -256,7 +257,7 @@ def meyer_factor(velocity: float) -> float:
 
 def meyer(
     length: float, rate: float, excitation: float, activation: float, m: SmoothMuscle
-) -> tuple[float, float, float, float, float, float, float, float, float, float]:
+) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
     """Meyer's muscle, whose tendon is rigid, at a moment; as `degroote`. OpenSim knows of no energy that it stores."""
     a = activation if m.follows else excitation
     along = length - m.slack
@@ -271,4 +272,4 @@ def meyer(
     tension = (active_force + passive_force) * cos
     activation_rate = smooth_activation_rate(excitation, a, m.rising, m.falling, m.sharpness)
     fibers = fiber_length, cos, active, factor, active_force, passive_force
-    return tension, a, *fibers, activation_rate, rate * cos
+    return tension, a, *fibers, activation_rate, rate * cos, m.strength * passive

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
@@ -76,13 +77,18 @@ class PathSystem(System):
         self._evaluated(q, u)
         return self._w[[items[-1][0] + what for items in self._items]]
 
-    def pulled(self, q: Array) -> Array:
-        """The generalized forces (p, n) of a tension of 1 N along each path."""
-        self._evaluated(q, np.zeros(len(q)))
-        forces = np.zeros((len(self._items), len(self.order)))
-        self.program.code.entry("pull_each")(self.program.ints, self.numbers, self._w, self._y, self._f, forces)
-        found = np.zeros((len(self._items), len(q)))
-        found[:, self.order] = forces
+    def pulled(self, poses: Array) -> Array:
+        """The generalized forces (k, p, n) of a tension of 1 N along each path, in poses (k, n)."""
+        states = np.zeros((len(poses), len(self._y)))
+        states[:, : len(self.order)] = poses[:, self.order]
+        forces = np.zeros((len(poses), len(self._items), len(self.order)))
+        pull, parts = self.program.code.entry("pull_each"), (self.numbers, self._w, self._y, self._f)
+        with self._computing():
+            status = self._run(pull, self.program.ints, *parts, len(poses), states, forces)
+        if status != layout.OK:
+            raise self.refusal(status, 0.0, self._y.tolist())
+        found = np.zeros((*forces.shape[:2], poses.shape[1]))
+        found[:, :, self.order] = forces
         return found
 
     def nodes(self, q: Array, routes: Mapping[str, Along]) -> dict[str, list[tuple[int, Array]]]:
@@ -189,10 +195,16 @@ class PathSystem(System):
 
     def _evaluated(self, q: Array, u: Array) -> None:
         y = self.state.pack(q.tolist(), u.tolist())
-        try:
+        with self._computing():
             status = self.realize(0.0, y, layout.FORCE_STAGE)
-        except (ArithmeticError, ValueError) as failure:
-            # Kernels as Python raise what machine code computes as no number.
-            raise SimulationError(f"the paths cannot be computed: {failure}") from failure
         if status != layout.OK:
             raise self.refusal(status, 0.0, y)
+
+    @staticmethod
+    @contextmanager
+    def _computing() -> Iterator[None]:
+        """Kernels as Python raise what machine code computes as no number."""
+        try:
+            yield
+        except (ArithmeticError, ValueError) as failure:
+            raise SimulationError(f"the paths cannot be computed: {failure}") from failure

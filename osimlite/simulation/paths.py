@@ -161,13 +161,20 @@ class Paths:
         move with it; NaN at one that cannot move. That is the derivative of the length times -1 only where the speed
         is its rate.
         """
-        values = self.mechanism.values(q)
-        arms = self.system.pulled(values)
-        arms[self._coupled] = arms[self._coupled] @ self.coupling(values)
+        (arms,) = self.all_moment_arms(self.mechanism.values(q)[None])
         return {
-            name: {path: arm for path, arm in zip(self._coordinates, row, strict=True) if not abs(arm) <= ROUNDING}
+            name: {path: arm for path, arm in zip(self._coordinates, row, strict=True) if arm != 0.0}
             for name, row in zip(self.names, arms.tolist(), strict=True)
         }
+
+    def all_moment_arms(self, poses: Array) -> Array:
+        """The same (k, p, n) of all paths about all coordinates, in poses (k, n) in the order of the mechanism."""
+        arms = self.system.pulled(poses)
+        if not all(isinstance(item, Lock) for item in self.mechanism.constraints):
+            for row, q in zip(arms, poses, strict=True):
+                row[self._coupled] = row[self._coupled] @ self.coupling(q)
+        arms[np.abs(arms) <= ROUNDING] = 0.0
+        return arms
 
     def coupling(self, q: Values) -> Array:
         """The generalized speeds (n, n) that go with a speed of 1 of each coordinate, in its column.
@@ -176,7 +183,7 @@ class Paths:
         """
         q = self.mechanism.values(q)
         constraints = self.mechanism.constraints
-        if not constraints:
+        if all(isinstance(item, Lock) for item in constraints):
             return np.eye(len(q))
         state = kinematics(self.mechanism, q, np.zeros(len(q)), bodies=self.mechanism.constrained)
         locks = {item.coordinate: item for item in constraints if isinstance(item, Lock)}

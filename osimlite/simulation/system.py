@@ -262,8 +262,16 @@ class System:
 
     def places_of(self, path: str, names: Iterable[str]) -> list[int]:
         """Where the work vector has what is known of an element, by the names of its kind."""
+        known = self._kind_at(path).known_of
+        return [self._records_at[path] + known[name] for name in names]
+
+    def knows(self, path: str, name: str) -> bool:
+        """Whether that is known of an element."""
+        return name in self._kind_at(path).known_of
+
+    def _kind_at(self, path: str) -> Any:
         element: Any = next(item for item in self.forces.elements if item.path == path)
-        return [self._records_at[path] + element.kind.known_of[name] for name in names]
+        return element.kind
 
     @property
     def room(self) -> int:

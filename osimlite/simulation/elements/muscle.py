@@ -26,6 +26,9 @@ RECORDED = (
 """What the law of a muscle gives first: N, m, N; what is kept of it besides are length and rate of the path, and the
 velocity of the fibers."""
 
+SPRING = "elastic_fiber_force"
+"""What of the passive force of fibers with damping is not by that, N."""
+
 PENNATION = Number(
     "pennation_angle_at_optimal", lambda x: 0.0 <= x <= 0.5 * pi - SIGNIFICANT, "is not from 0 to less than pi/2"
 )
@@ -97,7 +100,7 @@ def muscle(
     Args:
         component: its class.
         law: gives what is recorded, and then rates.
-        rates: of states; "fiber_velocity" is one.
+        rates: of states, of which "fiber_velocity" is one, and what else the law gives.
         parameters: that the law is given.
         more: attributes of the kind.
     """

@@ -10,7 +10,19 @@ from __future__ import annotations
 from osimlite.forces.vectors import Vector, along, dot, minus, norm, plus, put, times, turned, vector
 from osimlite.simulation.kernels.dynamics import clear_wrenches, generalized_forces
 from osimlite.simulation.kernels.functions import value_at
-from osimlite.simulation.kernels.layout import FREEDOMS, ITEM_AT, ITEMS, LAW, NUMBERS, OK, OWN, RECORD
+from osimlite.simulation.kernels.layout import (
+    FORCE_STAGE,
+    FREEDOMS,
+    ITEM_AT,
+    ITEMS,
+    LAW,
+    LAWS,
+    NUMBERS,
+    OK,
+    OWN,
+    RECORD,
+    STATE_SIZE,
+)
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import apply_force, direction, station, velocity
 
@@ -169,16 +181,22 @@ def pull_points(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) 
     return OK
 
 
-def pull_each(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, forces: Floats) -> int:
-    """The generalized forces of 1 N along each item, all of which are paths that were measured, in a row each."""
-    size = s[FREEDOMS]
+def pull_each(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int, states: Floats, forces: Floats) -> int:
+    """The generalized forces of 1 N along each item, all of which are paths, in a row each, state by state."""
+    size, items = s[FREEDOMS], s[ITEMS]
     applied = at(f, size)
-    for number in range(s[ITEMS]):
-        clear_wrenches(s, w)
-        for k in range(size):
-            applied[k] = 0.0
-        pull_path(s, x, w, y, f, s[s[ITEM_AT] + number], 1.0)
-        generalized_forces(s, w, applied)
-        for k in range(size):
-            forces[size * number + k] = applied[k]
+    for row in range(count):
+        for k in range(s[STATE_SIZE]):
+            y[k] = states[s[STATE_SIZE] * row + k]
+        status = call(s[LAWS], s, x, w, y, f, FORCE_STAGE)
+        if status != OK:
+            return status
+        for number in range(items):
+            clear_wrenches(s, w)
+            for k in range(size):
+                applied[k] = 0.0
+            pull_path(s, x, w, y, f, s[s[ITEM_AT] + number], 1.0)
+            generalized_forces(s, w, applied)
+            for k in range(size):
+                forces[size * (items * row + number) + k] = applied[k]
     return OK

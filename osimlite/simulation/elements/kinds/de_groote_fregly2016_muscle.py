@@ -4,7 +4,7 @@ from osimlite.forces.smooth_muscles import LARGEST_FORCE, SmoothTendon, degroote
 from osimlite.schema.muscles import DeGrooteFregly2016Muscle
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kind import State
-from osimlite.simulation.elements.muscle import muscle
+from osimlite.simulation.elements.muscle import SPRING, muscle
 from osimlite.simulation.elements.parameters import Fields, Number, positive
 from osimlite.simulation.elements.smooth_muscle import ACTIVATION, check_smooth, smooth_fields
 
@@ -34,7 +34,7 @@ def _tendon(builder: ElementBuilder, force: DeGrooteFregly2016Muscle) -> tuple[f
 KIND = muscle(
     DeGrooteFregly2016Muscle,
     degroote,
-    ("activation_rate", "normalized_tendon_force_rate", "fiber_velocity", "energy"),
+    ("activation_rate", "normalized_tendon_force_rate", "fiber_velocity", SPRING, "energy"),
     smooth_fields(_first),
     Fields(SmoothTendon, (positive("passive_fiber_strain_at_one_norm_force"),), _tendon),
     states=(

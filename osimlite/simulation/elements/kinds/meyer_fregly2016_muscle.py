@@ -2,13 +2,13 @@
 
 from osimlite.forces.smooth_muscles import meyer
 from osimlite.schema.muscles import MeyerFregly2016Muscle
-from osimlite.simulation.elements.muscle import muscle
+from osimlite.simulation.elements.muscle import SPRING, muscle
 from osimlite.simulation.elements.smooth_muscle import ACTIVATION, check_smooth, smooth_fields
 
 KIND = muscle(
     MeyerFregly2016Muscle,
     meyer,
-    ("activation_rate", "fiber_velocity"),
+    ("activation_rate", "fiber_velocity", SPRING),
     smooth_fields(),
     states=(ACTIVATION,),
     check=check_smooth,

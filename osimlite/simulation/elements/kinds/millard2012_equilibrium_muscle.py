@@ -25,7 +25,7 @@ from osimlite.schema.muscle_parts import MuscleFirstOrderActivationDynamicModel
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kind import DeclaredForce, State
-from osimlite.simulation.elements.muscle import curve, muscle, require
+from osimlite.simulation.elements.muscle import SPRING, curve, muscle, require
 from osimlite.simulation.elements.parameters import Fields, Number, positive
 
 LEAST_DAMPING = 0.001
@@ -95,7 +95,7 @@ def _energy(force: DeclaredForce, record: Sequence[float]) -> float:
 KIND = muscle(
     Millard2012EquilibriumMuscle,
     millard2012_equilibrium,
-    ("solved", "activation_rate", "fiber_velocity"),
+    ("solved", "activation_rate", "fiber_velocity", SPRING),
     Fields(
         Millard2012Equilibrium,
         (
