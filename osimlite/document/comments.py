@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from functools import cache, lru_cache
-from hashlib import blake2b
 from pathlib import Path
 
 DIGEST_SIZE = 6
@@ -29,6 +28,9 @@ def all_generated(data: bytes) -> bool:
 
 def digest(text: str) -> bytes:
     """Digest of a comment, white space and digits aside."""
+    # The library behind it takes longer to load than most files do to read, and many have no comments.
+    from hashlib import blake2b
+
     plain = re.sub(r"[\s\d]+", " ", text).strip()
     return blake2b(plain.encode(), digest_size=DIGEST_SIZE).digest()
 
