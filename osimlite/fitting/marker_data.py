@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite.errors import DocumentError, MissingDependency
+from osimlite.errors import DocumentError
 from osimlite.files import read_file
 from osimlite.fitting.recorded import Recording
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
+from osimlite.simulation.files.c3d import ENDING, read_c3d_markers
 from osimlite.simulation.files.storage import read_sto
 from osimlite.tables import METRES, MarkerHeader
 
@@ -137,25 +136,10 @@ def read_c3d(path: str | Path) -> MarkerData:
         DocumentError: it is no .c3d file.
         MissingDependency: ezc3d is not installed.
     """
-    read_file(path)
-    try:
-        found: Any = import_module("ezc3d").c3d(str(path))
-    except ImportError:
-        raise MissingDependency(
-            "a .c3d file is read by ezc3d, which is not installed; run: pip install ezc3d", file=str(path)
-        ) from None
-    except (OSError, RuntimeError, ValueError) as error:
-        raise DocumentError(f"the file cannot be read: {error}", file=str(path)) from None
-    points = found["parameters"]["POINT"]
-    unit = METRES.get(points["UNITS"]["value"][0].strip().lower(), 0.001)
-    names = tuple(name for key, more in points.items() if key.startswith("LABELS") for name in more["value"])
-    positions = np.moveaxis(found["data"]["points"][:3], (2, 1, 0), (0, 1, 2))
-    rate, first = found["header"]["points"]["frame_rate"], found["header"]["points"]["first_frame"]
-    times = (first + np.arange(len(positions))) / rate
-    return MarkerData(names[: positions.shape[1]], times, unit * positions, str(path))
+    return MarkerData(*read_c3d_markers(path), str(path))
 
 
 Measured = MarkerData | str | Path | Mapping[str, ArrayLike]
 """Markers in any form."""
 
-_READERS = {".trc": read_trc, ".c3d": read_c3d, ".sto": read_sto_markers}
+_READERS = {".trc": read_trc, ENDING: read_c3d, ".sto": read_sto_markers}

@@ -1,4 +1,4 @@
-"""Measured forces: the ExternalLoads of a document and the columns of their data file.
+"""Measured forces: the ExternalLoads of a document and the columns of their data file (.sto, .mot, .c3d).
 
 As in OpenSim, a column is a natural cubic spline through all its values, straight lines if there are two or three, and
 a constant if there is one. Before the first time and after the last, a spline goes on straight.
@@ -21,7 +21,8 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.prescribed import ExternalForce, ExternalLoads
 from osimlite.simulation.elements.geometries.load import Load
 from osimlite.simulation.elements.kind import DeclaredForce
-from osimlite.simulation.files.storage import StoTable, read_beside
+from osimlite.simulation.files.c3d import ENDING, read_c3d_forces
+from osimlite.simulation.files.storage import StoTable, beside, read_sto
 from osimlite.text import listed, nearest
 
 if TYPE_CHECKING:
@@ -71,7 +72,8 @@ def _data(loads: ExternalLoads, folder: Path, file: str) -> _Columns:
     name = loads.datafile.strip()
     if not name:
         raise DocumentError("it names no data file; give it a <datafile>", file=file)
-    return _Columns(read_beside(folder, name))
+    path = beside(folder, name)
+    return _Columns(read_c3d_forces(path) if path.suffix.lower() == ENDING else read_sto(path))
 
 
 def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: str) -> Load:

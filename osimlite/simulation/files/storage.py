@@ -120,11 +120,6 @@ def read_sto(path: str | Path) -> StoTable:
         )
 
 
-def read_beside(folder: Path, name: str) -> StoTable:
-    """Read a table that a document names; see :func:`beside`."""
-    return read_sto(beside(folder, name))
-
-
 def beside(folder: Path, name: str) -> Path:
     """Where a file is that a document names: looked for in the document's folder, then from where the program runs."""
     there, here = folder / name, Path(name)

@@ -1,0 +1,92 @@
+"""Forces out of .c3d files: what the plates measured, and loads of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.errors import DocumentError, MissingFileError
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.simulation.elements.external_loads import read_external_loads
+from osimlite.simulation.files.c3d import read_c3d_forces
+from osimlite.simulation.files.storage import write_sto
+
+ezc3d = pytest.importorskip("ezc3d", reason="needs ezc3d (extra 'c3d')")
+
+LOADS = """<OpenSimDocument Version="40600">
+    <ExternalLoads name="loads">
+        <objects>
+            <ExternalForce name="right">
+                <applied_to_body>RightShank</applied_to_body>
+                <force_expressed_in_body>ground</force_expressed_in_body>
+                <point_expressed_in_body>ground</point_expressed_in_body>
+                <force_identifier>f1_</force_identifier>
+                <point_identifier>p1_</point_identifier>
+                <torque_identifier>m1_</torque_identifier>
+            </ExternalForce>
+        </objects>
+        <datafile>{file}</datafile>
+    </ExternalLoads>
+</OpenSimDocument>
+"""
+
+
+def measured(folder: Path, plates: int = 1) -> Any:
+    """A trial of 5 frames, 100 Hz, with plates that measured at 1 kHz; what each channel was (6, 50)."""
+    file, steps = ezc3d.c3d(), np.arange(50)
+    file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
+    file["parameters"]["POINT"]["RATE"]["value"] = [100.0]
+    file["parameters"]["POINT"]["LABELS"]["value"] = ["one"]
+    file["data"]["points"] = np.ones((4, 1, 5))
+    analog, plate = file["parameters"]["ANALOG"], file["parameters"]["FORCE_PLATFORM"]
+    channels = np.array([10.0 + steps, 20.0 - steps, -700.0 - steps, 1e3 + steps, 2e3 - steps, 3e3 + 2 * steps])
+    analog["RATE"]["value"], analog["LABELS"]["value"] = [1000.0], ["Fx", "Fy", "Fz", "Mx", "My", "Mz"]
+    analog["UNITS"]["value"] = ["N", "N", "N", "Nmm", "Nmm", "Nmm"]
+    file["data"]["analogs"] = channels[None]
+    corners = np.array(((500.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 400.0, 0.0), (500.0, 400.0, 0.0))).T
+    plate["USED"]["value"], plate["TYPE"]["value"] = np.array([plates]), np.full(plates, 2)
+    if plates:
+        plate["CORNERS"]["value"], plate["ORIGIN"]["value"] = corners[:, :, None], np.array([[0.0], [0.0], [-40.0]])
+        plate["CHANNEL"]["value"] = np.arange(1, 7)[:, None]
+    file.write(str(folder / "trial.c3d"))
+    return channels
+
+
+def test_forces_are_those_of_the_plate(tmp_path: Path) -> None:
+    """The plate looks downwards, its origin is 4 cm below its surface: moments are those about its middle."""
+    x, y, z, mx, my, mz = measured(tmp_path)
+    table = read_c3d_forces(tmp_path / "trial.c3d")
+    assert table.columns == tuple(f"{letter}1_{axis}" for letter in "fpm" for axis in "xyz")
+    assert np.diff(table.times) == pytest.approx(0.001) and len(table.times) == 50
+    assert table.rows[:, :3] == pytest.approx(np.stack((x, -y, -z), axis=1), rel=1e-6)
+    assert table.rows[:, 3:6] == pytest.approx(np.tile((0.25, 0.2, 0.0), (50, 1)))
+    about = np.stack((mx - 40.0 * y, -(my + 40.0 * x), -mz), axis=1) / 1000.0
+    assert table.rows[:, 6:] == pytest.approx(about, rel=1e-5, abs=1e-5)
+
+
+def test_loads_of_a_c3d_file_are_those_of_a_table(tmp_path: Path) -> None:
+    measured(tmp_path)
+    table = read_c3d_forces(tmp_path / "trial.c3d")
+    write_sto(tmp_path / "trial.sto", "forces", table.times.tolist(), table.columns, table.rows.tolist())
+    mechanism, found = osimlite.mechanism(dynamic_walker()), []
+    for file in ("trial.c3d", "trial.sto"):
+        (tmp_path / "loads.xml").write_text(LOADS.format(file=file))
+        (force,) = read_external_loads(mechanism, tmp_path / "loads.xml")
+        load: Any = force.place
+        found.append([f.derivatives(0.0123)[0] for f in (*load.force, *load.point, *load.torque)])
+    assert found[0] == pytest.approx(found[1], rel=1e-12) and len(found[0]) == 9
+
+
+def test_what_has_no_forces_is_told(tmp_path: Path) -> None:
+    measured(tmp_path, plates=0)
+    with pytest.raises(DocumentError, match="has no force plates"):
+        read_c3d_forces(tmp_path / "trial.c3d")
+    with pytest.raises(MissingFileError):
+        read_c3d_forces(tmp_path / "none.c3d")
+    (tmp_path / "torn.c3d").write_bytes(b"no file of motion capture")
+    with pytest.raises(DocumentError, match="cannot be read"):
+        read_c3d_forces(tmp_path / "torn.c3d")
