@@ -20,6 +20,8 @@ from osimlite.multibody.functions import Univariate
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 
+TOUCHING = 1e-9
+"""Points that are closer than this part of their mean distance are one."""
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
@@ -76,9 +78,11 @@ def derivatives_of_samples(
         orders: of the derivatives; 0 is the value.
         half_order: the splines are of degree 2 `half_order` - 1.
     """
-    points = np.asarray(x, dtype=float)
+    points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     places, scale = _unit_spacing(points)
-    spline = _through(places, np.asarray(y, dtype=float), half_order)
+    # What lies closer to the point before than rounding of the values would let a slope be found, says nothing.
+    kept = np.diff(places, prepend=-1.0) > TOUCHING
+    spline = _through(places[kept], values[kept], half_order)
     own = (np.asarray(at, dtype=float) - points[0]) / scale
     return tuple(spline(own, order) / scale**order for order in orders)
 

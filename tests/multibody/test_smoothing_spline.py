@@ -124,3 +124,11 @@ def test_rates_taken_in_blocks_are_those_of_the_whole_spline(count):
             _, slope, bend = _at(whole, x[row])
             assert first[row, column] == pytest.approx(slope, rel=1e-8, abs=1e-8 * np.abs(first).max())
             assert second[row, column] == pytest.approx(bend, rel=1e-8, abs=1e-8 * np.abs(second).max())
+
+
+@pytest.mark.parametrize("place", [0, 30, 60])
+def test_samples_at_times_that_differ_by_rounding_are_one(place):
+    x = np.insert(np.linspace(0.0, 3.0, 61), place + 1, np.linspace(0.0, 3.0, 61)[place] + 2e-14)
+    first, second = derivatives_of_samples(x, np.sin(x)[:, None], x, (1, 2))
+    assert first[:, 0] == pytest.approx(np.cos(x), abs=1e-3)
+    assert second[10:-10, 0] == pytest.approx(-np.sin(x[10:-10]), abs=1e-4)
