@@ -6,7 +6,8 @@ are given in the frames of the bodies; -1 stands for ground.
 
 from __future__ import annotations
 
-from typing import Generic, NamedTuple, TypeVar
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.parts import FramePlacement, StationPlacement
 from osimlite.multibody.spatial import Array, cross, skew
 from osimlite.records import dataclass
+
+if TYPE_CHECKING:
+    from osimlite.multibody.mechanism import Mechanism
 
 
 class MovingVector(NamedTuple):
@@ -51,12 +55,26 @@ def station(state: Kinematics, place: StationPlacement) -> MovingVector:
 def meeting(state: Kinematics, first: StationPlacement, second: StationPlacement) -> MovingVector:
     """From one station to another, and how fast the second leaves the point of the first body that is there.
 
-    This is what Simbody holds still: as the first body sees it, the rate of the vector.
+    This is what Simbody holds still: as the first body sees it, the rate of the vector, and as the body sees it that
+    carries both, how that changes.
     """
     end = station(state, second)
     body = first.body
     start = station(state, StationPlacement(body, state.rotations[body].T @ (end.value - state.origins[body])))
-    return end.minus(start)._replace(value=end.value - station(state, first).value)
+    apart = end.minus(start)
+    turning = state.velocities[carrier(state.mechanism, (body, second.body))][:3]
+    bias = apart.bias - 2.0 * cross(turning, apart.rate)
+    return apart._replace(value=end.value - station(state, first).value, bias=bias)
+
+
+def carrier(mechanism: Mechanism, bodies: Iterable[int]) -> int:
+    """The outermost body that carries bodies, or is one of them; -1 for ground."""
+    found = set(bodies)
+    while len(found) > 1:
+        # Bodies follow what carries them.
+        outer = max(found)
+        found = found - {outer} | {mechanism.bodies[outer].parent}
+    return found.pop()
 
 
 def direction(state: Kinematics, body: int, axis: Array) -> MovingVector:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 
 import numpy as np
 
+from osimlite.multibody.body_constraints import carrier
 from osimlite.multibody.constraints import Constraint, Coupler
 from osimlite.multibody.dynamics import SLIGHT, MassCentres
 from osimlite.multibody.kinematics import Kinematics
@@ -84,9 +85,8 @@ def recorded(motion: Motion) -> tuple[list[str], Array]:
             if name is None:
                 continue
             if constraint.bodies:
-                carrier = _carrier(mechanism, constraint.bodies)
                 wrenches = forces.on_bodies(constraint, multipliers).reshape(-1, 2, 3)[:, ::-1]
-                row.append((wrenches @ forces.state.rotations[carrier]).ravel())
+                row.append((wrenches @ forces.state.rotations[carrier(mechanism, constraint.bodies)]).ravel())
                 columns = [
                     f"{_name(mechanism, body)}_{what}{axis}"
                     for body in constraint.bodies
@@ -105,16 +105,6 @@ def recorded(motion: Motion) -> tuple[list[str], Array]:
 
 def _name(mechanism: Mechanism, body: int) -> str:
     return "ground" if body == GROUND else mechanism.bodies[body].name
-
-
-def _carrier(mechanism: Mechanism, bodies: Sequence[int]) -> int:
-    """The outermost body that carries bodies, or is one of them."""
-    found = set(bodies)
-    while len(found) > 1:
-        # What stands further back is no nearer to ground than others.
-        outer = max(found)
-        found = found - {outer} | {mechanism.bodies[outer].parent}
-    return found.pop()
 
 
 def _mobilities(mechanism: Mechanism, constraint: Constraint) -> list[int]:

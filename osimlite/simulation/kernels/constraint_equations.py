@@ -26,6 +26,7 @@ from osimlite.simulation.kernels.layout import (
     NUMBERS,
     OK,
     ORIGIN,
+    PARENT,
     TIME,
     WORK_COLUMN,
     WORK_DRIFTS,
@@ -166,7 +167,16 @@ def follow(s: Ints, x: Floats, w: Floats, kind: Ints, p: Floats) -> tuple[Vector
     if kind[0] == MEETING:
         start = end
     rate = minus(velocity(s, w, two, end), velocity(s, w, one, start))
-    return arm, rate, minus(acceleration(s, x, w, two, end), acceleration(s, x, w, one, start))
+    bias = minus(acceleration(s, x, w, two, end), acceleration(s, x, w, one, start))
+    if kind[0] == MEETING:
+        # As what carries both sees it.
+        while one != two:
+            if one > two:
+                one = s[s[LINK_AT] + LINK_INTS * one + PARENT]
+            else:
+                two = s[s[LINK_AT] + LINK_INTS * two + PARENT]
+        bias = minus(bias, times(2.0, cross(angular_velocity(s, w, one), rate)))
+    return arm, rate, bias
 
 
 def lean(s: Ints, w: Floats, kind: Ints, p: Floats, on: Vector, row: Floats) -> None:
