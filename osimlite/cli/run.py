@@ -31,6 +31,10 @@ def run(
     workers: sweeping.Workers = None,
     cluster: sweeping.Cluster = None,
     resume: Annotated[bool, Option("--resume", help="Leave out what an interrupted run has done.")] = False,
+    report: Annotated[
+        Path | None,
+        Option("--report", metavar="FILE.html", help="Show it all on one page.", show_default=False),
+    ] = None,
     as_json: Annotated[bool, Option("--json", help="Print what became of each setup as JSON.")] = False,
 ) -> None:
     """Run setup files of OpenSim's tools, and write the files that OpenSim would write.
@@ -49,8 +53,8 @@ def run(
     from osimlite.tools.many import found, run_many
 
     files = found(setups)
-    if len(files) == 1 and not as_json and not (resume or cluster):
-        raise SystemExit(_run_one(files[0], output))
+    if report is not None or (len(files) == 1 and not as_json and not (resume or cluster)):
+        raise SystemExit(_run_each(files, output, report))
     count = 1 if workers is None and cluster is None and len(files) < WORTH_SHARING else workers
     with progress_bar("running", len(files)) as progress:
         trials = run_many(
@@ -73,18 +77,27 @@ def _codes(trials: list[Trial]) -> list[int]:
     return [{DONE: 0, NO: 1}.get(trial.status, 2) for trial in trials]
 
 
-def _run_one(setup: Path, output: Path | None) -> int:
+def _run_each(setups: list[Path], output: Path | None, report: Path | None) -> int:
+    """Run setups in the order that is given, and say of each what came out; the first that fails is the last."""
     from osimlite.lint.diagnostic import Report
+    from osimlite.tools.many import places_of
     from osimlite.tools.running import FaultySetup
     from osimlite.tools.running import run as run_setup
 
-    try:
-        outcome = run_setup(setup, output, tell=_show_findings)
-    except FaultySetup as fault:
-        _show_findings(Report(fault.report.errors, fault.report.texts))
-        raise
-    _show(setup, outcome)
-    return 0 if outcome.done else 1
+    outcomes: dict[str | Path, Outcome] = {}
+    for setup, place in places_of(setups, output).items():
+        try:
+            outcomes[setup] = run_setup(setup, place, tell=_show_findings)
+        except FaultySetup as fault:
+            _show_findings(Report(fault.report.errors, fault.report.texts))
+            raise
+        _show(setup, outcomes[setup])
+    if report is not None:
+        from osimlite.cli._console import say
+        from osimlite.view.report import report as write_report
+
+        say(f"wrote {write_report(outcomes, report)}")
+    return 0 if all(outcome.done for outcome in outcomes.values()) else 1
 
 
 def _show_findings(report: Report) -> None:

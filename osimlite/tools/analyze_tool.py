@@ -42,7 +42,7 @@ def run(job: Job, outcome: Outcome) -> None:
         times, found = zip(*kept, strict=True)
         motion = Motion(model, simulation, np.array(times), np.array(found))
         analyse(job, outcome, analyses, motion, first)
-    tell_rows(outcome, times)
+    tell_rows(job, outcome, motion)
 
 
 def _followed(job: Job, simulation: Simulation) -> tuple[int, Iterator[tuple[float, list[float]]]]:

@@ -41,7 +41,7 @@ def run(job: Job, outcome: Outcome) -> None:
         motion = Motion(model, simulation, np.array(times), np.array(states), steps)
         _write(job, outcome, motion)
         analyse(job, outcome, analyses, motion)
-    tell_rows(outcome, times)
+    tell_rows(job, outcome, motion)
 
 
 def _start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[float, list[float]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.multibody import build_mechanism
-from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.multibody.mechanism import Mechanism
 from osimlite.schema.joints import Joint, ScapulothoracicJoint
 from osimlite.schema.model import Model
 from osimlite.schema.tools.dynamics import InverseDynamicsTool
@@ -13,6 +13,7 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.files.recorded import RecordedMotion, exclude_forces
 from osimlite.simulation.files.storage import StoTable
 from osimlite.text import did_you_mean
+from osimlite.tools.evidence import Evidence, root_of
 from osimlite.tools.job import Job
 from osimlite.tools.joint_loads import loads_at_joints
 from osimlite.tools.not_runnable import NotRunnable
@@ -31,14 +32,18 @@ def run(job: Job, outcome: Outcome) -> None:
         recorded = recorded.lowpassed(cutoff, continued=True)
     recorded = recorded.between(*setup.time_range)
     exclude_forces(model, map(str, setup.forces_to_exclude))
-    forces = force_elements(model, recorded.mechanism, external_loads=job.path("external_loads_file"), folder=None)
+    loads = job.path("external_loads_file")
+    forces = force_elements(model, recorded.mechanism, external_loads=loads, folder=None)
     table = recorded.inverse_dynamics(forces)
     outcome.table(job.in_results(setup.output_gen_force_file), table)
     if joints:
         found = np.empty_like(table.rows)
         found[:, [place for body in recorded.mechanism.bodies for place in body.mobilizer.coordinates]] = table.rows
-        loads = loads_at_joints(model, joints, recorded, found)
-        outcome.table(job.in_results(setup.output_body_forces_file), loads)
+        at_joints = loads_at_joints(model, joints, recorded, found)
+        outcome.table(job.in_results(setup.output_body_forces_file), at_joints)
+    outcome.evidence = Evidence.of(
+        model, job.needed("model_file"), recorded.mechanism, recorded.times, recorded.values, loads=loads
+    )
     outcome.tell("largest", f"{np.abs(table.rows).max():.6g}")
     _tell_residuals(outcome, recorded.mechanism, table)
 
@@ -48,10 +53,7 @@ def _tell_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -> 
 
     Their advice is 5 % of the measured force at most, and moments of 1 % of that times the height of the mass centre.
     """
-    roots = [body for body in mechanism.bodies if body.parent == GROUND and len(body.mobilizer.coordinates) == 6]
-    if len(roots) != 1:
-        return
-    names = [mechanism.coordinates[place].name for place in roots[0].mobilizer.coordinates]
+    names = [mechanism.coordinates[place].name for place in root_of(mechanism)]
     weight = mechanism.total_mass * float(np.linalg.norm(mechanism.gravity))
     for what, unit in (("force", "N"), ("moment", "N m")):
         own = [table[label] for label in (f"{name}_{what}" for name in names) if label in table.columns]

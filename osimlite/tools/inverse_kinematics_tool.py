@@ -10,6 +10,7 @@ from osimlite.schema.tools.inverse_kinematics import IKMarkerTask, InverseKinema
 from osimlite.simulation.files.old_storage import UNITS
 from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.text import listed
+from osimlite.tools.evidence import Evidence
 from osimlite.tools.job import NONE, Job
 from osimlite.tools.outcome import Outcome
 
@@ -20,7 +21,8 @@ def run(job: Job, outcome: Outcome) -> None:
     coordinates = job.path("coordinate_file")
     table = None if coordinates is None else read_sto(coordinates)
     data = MarkerData.of(job.needed("marker_file"))
-    motion = run_inverse_kinematics(setup, job.model(), data, table)
+    model = job.model()
+    motion = run_inverse_kinematics(setup, model, data, table)
     times = motion.times
     if setup.output_motion_file.strip() not in NONE:
         outcome.table(job.result(setup.output_motion_file), motion_table(motion), f"\n{UNITS}")
@@ -36,6 +38,10 @@ def run(job: Job, outcome: Outcome) -> None:
         path = job.in_results(f"{setup.name}_ik_model_marker_locations.sto")
         places = motion.places.reshape(len(times), -1)
         outcome.table(path, StoTable("Model Marker Locations from IK", times, columns, places))
+    outcome.evidence = Evidence.of(
+        model, job.needed("model_file"), motion.mechanism, times, motion.values,
+        markers=motion.markers, measured=motion.measured, places=motion.places,
+    )  # fmt: skip
     outcome.summary |= motion.summary
     for words in told(motion):
         outcome.tell("markers", words)

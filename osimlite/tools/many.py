@@ -111,7 +111,7 @@ def run_many(
         OsimliteError: the cluster cannot be reached.
     """
     journal = _Journal(output or Path(), resume, is_kept=len(setups) > 1)
-    places = _places(setups, output)
+    places = places_of(setups, output)
     work = _Work(setups, journal, progress)
     do = partial(_one, places)
     try:
@@ -141,7 +141,7 @@ def _tell_clashes(trials: Sequence[Trial]) -> None:
                 trial.message = f"'{other.setup}' writes '{file}' too; give each a place of its own, or -o FOLDER"
 
 
-def _places(setups: Sequence[Path], output: Path | None) -> dict[Path, Path | None]:
+def places_of(setups: Sequence[Path], output: Path | None) -> dict[Path, Path | None]:
     """A folder for the results of each setup; none if these go where the setup says."""
     if output is None or len(setups) == 1:
         return dict.fromkeys(setups, output)

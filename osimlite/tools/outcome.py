@@ -10,6 +10,7 @@ from osimlite.files import make_folder, written_atomically
 from osimlite.records import dataclass, field, replace
 from osimlite.simulation.files.old_storage import PRECISION, printed
 from osimlite.simulation.files.storage import StoTable, adapter_lines
+from osimlite.tools.evidence import Evidence
 
 
 @dataclass(eq=False)
@@ -22,6 +23,7 @@ class Outcome:
         told: the same in words: a name, and what is said of it.
         files: those that were written.
         warnings: how many the check of the setup and of what it names gave.
+        evidence: what a report shows besides.
         done: whether the tool did what it was asked for; what it found is written all the same.
     """
 
@@ -30,6 +32,7 @@ class Outcome:
     told: list[tuple[str, str]] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
     warnings: int = 0
+    evidence: Evidence | None = None
     done: bool = True
     _texts: dict[Path, Iterable[str]] = field(default_factory=dict)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite._load import module_name
-from osimlite.multibody.spatial import Array
 from osimlite.records import replace
 from osimlite.schema.base import Object
 from osimlite.schema.forces import ForceSet
@@ -23,6 +21,7 @@ from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.start import columns_of_states, starting
 from osimlite.text import listed
+from osimlite.tools.evidence import Evidence
 from osimlite.tools.job import Job
 from osimlite.tools.motion import Motion, Tables
 from osimlite.tools.not_runnable import NotRunnable
@@ -166,7 +165,12 @@ class StateRows(NamedTuple):
             outcome.tell("not in the file", f"{listed(self.missing)}: the default values are taken")
 
 
-def tell_rows(outcome: Outcome, times: Array | Sequence[float]) -> None:
-    """Say how many rows there are."""
+def tell_rows(job: Job, outcome: Outcome, motion: Motion) -> None:
+    """Say how many rows there are, and keep what a report shows of them."""
+    times = motion.times
+    outcome.evidence = Evidence.of(
+        motion.model, job.needed("model_file"), motion.mechanism, times, motion.values,
+        loads=job.path("external_loads_file"),
+    )  # fmt: skip
     outcome.tell("rows", f"{len(times)}, from {times[0]:g} s to {times[-1]:g} s")
     outcome.summary["rows"] = len(times)

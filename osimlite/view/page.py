@@ -27,6 +27,7 @@ from osimlite.translate.sidecar import finite
 from osimlite.view.inspect import component_tree, finding_rows, pins
 from osimlite.view.motion import Motion, activity, moving, values_of
 from osimlite.view.pushes import Pushes
+from osimlite.view.recording import MeasuredMarkers
 from osimlite.view.routes import kernels_text, routes_data, text_of
 from osimlite.view.scene import LAYERS, STEEPEST, Scene
 
@@ -253,10 +254,22 @@ def _motion(scene: Scene, motion: Motion) -> dict[str, Any]:
         "values": text_of(values.astype("<f8")),
         "ends": np.column_stack((values.min(axis=0), values.max(axis=0))).tolist(),
         **_view(scene, values),
+        "measured": _measured(getattr(motion, "measured", None)),
         "forces": forces,
         "activations": {
             path: text_of(np.rint(255.0 * level).astype(np.uint8)) for path, level in activity(scene, motion).items()
         },
+    }
+
+
+def _measured(markers: MeasuredMarkers | None) -> dict[str, Any] | None:
+    """Where markers were measured, and what they belong to."""
+    if markers is None:
+        return None
+    pairs = zip(markers.names, markers.stations, strict=True)
+    return {
+        "markers": [{"name": name, "body": body, "at": place.tolist()} for name, (body, place) in pairs],
+        "places": text_of(markers.places.astype("<f4")),
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,11 +19,25 @@ from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.view.motion import at_times
 
 
+class MeasuredMarkers(NamedTuple):
+    """Markers that were measured during a motion, and those of the model that go with them.
+
+    Attributes:
+        names: of the m markers.
+        stations: the body of each (-1 for ground), and its place there (3,), m.
+        places: where they were measured (t, m, 3), m; NaN where one was not seen.
+    """
+
+    names: Sequence[str]
+    stations: Sequence[tuple[int, Array]]
+    places: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """A motion from a file; the attributes are those of a :class:`osimlite.view.motion.Motion`.
 
-    `remarks` are sentences on what the files do not say.
+    `remarks` are sentences on what the files do not say, `measured` the markers that it was found from.
     """
 
     times: Array
@@ -32,6 +47,7 @@ class Recording:
     forces: Mapping[str, Array] = field(default_factory=dict)
     auxiliary: Mapping[str, Array] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    measured: MeasuredMarkers | None = None
 
 
 def read_recording(

@@ -3,7 +3,7 @@
 (() => {
   const { bytes, point, Tubes } = window.osimlite;
   const T = window.THREE;
-  const FORCE = 0xd55e00, TOUCHING = 0xf7b538, SELECTED = 0x1f6feb, CHOSEN = 0x00a86b, TENDON = 0xe3c88c, MARKS = { error: 0xd1242f, warning: 0xd98e00, info: 0x57606a };
+  const FORCE = 0xd55e00, MEASURED = 0x009e73, TOUCHING = 0xf7b538, SELECTED = 0x1f6feb, CHOSEN = 0x00a86b, TENDON = 0xe3c88c, MARKS = { error: 0xd1242f, warning: 0xd98e00, info: 0x57606a };
 
   const floats = (text) => new Float32Array(bytes(text).buffer);
   const toned = ([r, g, b]) => new T.Color().setRGB(r, g, b, T.SRGBColorSpace);
@@ -99,6 +99,7 @@
       this.tubes("springs");
       this.tubes("geometry");
       this.pushes();
+      this.seen();
       this.paint();
     }
 
@@ -131,6 +132,38 @@
       this.layers[layer].add(tubes.mesh);
       if (layer === "geometry") this.scene.add(this.layers.geometry);
       (this.tubed ||= []).push(tubes);
+    }
+
+    // Markers as they were measured, each with a line to the one of the model that goes with it.
+    seen() {
+      const given = this.data.motion?.measured, layer = this.layers.markers;
+      if (!given) return;
+      const material = new T.MeshStandardMaterial({ color: MEASURED, roughness: 0.4 });
+      const thin = new T.LineBasicMaterial({ color: MEASURED });
+      layer.visible = true;
+      this.scene.add(layer);
+      this.measured = given.markers.map((marker) => {
+        const gem = new T.Group();
+        for (const way of [1, -1]) gem.add(new T.Mesh(new T.ConeGeometry(1, way, 8).translate(0, 0.5 * way, 0), material));
+        gem.scale.setScalar(0.008 * this.data.size);
+        const ends = new T.BufferAttribute(new Float32Array(6), 3);
+        const line = new T.Line(new T.BufferGeometry().setAttribute("position", ends), thin);
+        line.frustumCulled = false;
+        layer.add(gem, line);
+        return { marker, gem, line, ends };
+      });
+    }
+
+    meet(row) {
+      (this.measured || []).forEach(({ marker, gem, line, ends }, k) => {
+        const first = 3 * (row * this.measured.length + k), place = row < 0 ? [NaN] : this.data.motion.measured.places.subarray(first, first + 3);
+        gem.visible = line.visible = !Number.isNaN(place[0]);
+        if (!gem.visible) return;
+        gem.position.set(...place);
+        const own = point(this.poses[marker.body < 0 ? this.poses.length - 1 : marker.body], marker.at);
+        ends.array.set([...place, own[0], own[1], own[2]]);
+        ends.needsUpdate = true;
+      });
     }
 
     pushes() {
@@ -203,6 +236,7 @@
       this.row = row;
       (this.tubed || []).forEach((tubes) => this.lay(tubes));
       this.push(row);
+      this.meet(row);
       this.wanted();
     }
 

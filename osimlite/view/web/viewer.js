@@ -33,6 +33,7 @@
       motion.times = new Float64Array(bytes(motion.times).buffer);
       motion.values = new Float64Array(bytes(motion.values).buffer);
       for (const path in motion.activations) motion.activations[path] = bytes(motion.activations[path]);
+      if (motion.measured) motion.measured.places = new Float32Array(bytes(motion.measured.places).buffer);
       motion.largest = 0;
       for (const force of motion.forces) {
         force.values = new Float32Array(bytes(force.values).buffer);

@@ -1,0 +1,114 @@
+"""Reports of trials: steps by the force, what is drawn over what, a page that needs nothing else."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib", reason="needs matplotlib (extra 'plot')")
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+
+import osimlite
+from osimlite.errors import OsimliteError
+from osimlite.multibody import build_mechanism
+from osimlite.simulation.files.storage import write_sto
+from osimlite.tools.evidence import root_of, side_of, steps_of
+from osimlite.tools.outcome import Outcome
+from osimlite.view.report import Trial, _angles, _moments, report
+from tests.cli.command import run
+from tests.fitting.test_inverse_kinematics import free_body
+from tests.tools.test_many import make_trial
+
+FORCE = """<ExternalForce name="{side}"><applied_to_body>calcn_{side}</applied_to_body>
+<force_expressed_in_body>ground</force_expressed_in_body><force_identifier>{side}_v</force_identifier></ExternalForce>"""
+
+
+@pytest.fixture
+def loads(tmp_path: Path) -> Path:
+    """Loads of two feet that stand for 0.6 s of every second, with noise for one sample."""
+    times = np.arange(0.0, 3.0, 0.01)
+    columns, rows = [], []
+    for side, start in (("r", 0.25), ("l", 0.75)):
+        force = np.where((times - start) % 1.0 < 0.6, 700.0, 0.0)
+        force[times < start] = 0.0
+        force[150] = 700.0 - force[150]
+        columns += [f"{side}_v{axis}" for axis in "xyz"]
+        rows += [0.0 * force, force, 0.0 * force]
+    write_sto(tmp_path / "grf.mot", "grf", times.tolist(), columns, np.array(rows).T.tolist())
+    forces = "".join(FORCE.format(side=side) for side in "rl")
+    text = f'<ExternalLoads name="l"><objects>{forces}</objects><datafile>grf.mot</datafile></ExternalLoads>'
+    (tmp_path / "loads.xml").write_text(f'<OpenSimDocument Version="40600">{text}</OpenSimDocument>')
+    return tmp_path / "loads.xml"
+
+
+def test_steps_are_where_the_force_begins_and_ends(loads: Path) -> None:
+    steps = steps_of(loads, 1)
+    assert steps["r"].strikes == pytest.approx((0.25, 1.25, 2.25), abs=0.0101)
+    assert steps["r"].offs == pytest.approx((0.85, 1.85, 2.85), abs=0.0101)
+    assert steps["l"].strikes == pytest.approx((0.75, 1.75, 2.75), abs=0.0101) and len(steps["l"].offs) == 2
+    assert len(steps["r"].cycles) == 2
+    assert steps_of(loads, 0)["r"].strikes == ()
+
+
+def test_sides_and_roots() -> None:
+    names = ["knee_angle_r", "r_knee_angle", "knee_angle_l", "lumbar", "r"]
+    assert [side_of(name) for name in names] == [("knee_angle", "r")] * 2 + [
+        ("knee_angle", "l"), ("lumbar", ""), ("r", ""),
+    ]  # fmt: skip
+    assert root_of(build_mechanism(free_body())) == tuple(range(6))
+
+
+@pytest.fixture
+def trials(tmp_path: Path) -> Path:
+    """Two trials of a model whose name is none for HTML."""
+    model = free_body()
+    model.name = 'a <b>"model"'
+    osimlite.write(model, tmp_path / "model.osim")
+    for seed in range(2):
+        make_trial(tmp_path / f"trial{seed}", seed)
+    return tmp_path
+
+
+def data_of(page: str) -> list[dict[str, Any]]:
+    """The data of the viewers in a page."""
+    inner = [html.unescape(text) for text in re.findall(r'srcdoc="([^"]*)"', page)]
+    found = [re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S) for text in inner]
+    return [json.loads(match[1]) for match in found if match]
+
+
+def test_a_page_for_two_trials_needs_nothing_else(trials: Path) -> None:
+    words = [f"trial{k}/{name}.xml" for k in range(2) for name in ("z_ik", "id")]
+    done = run("run", *words, "--report", "report.html", folder=trials)
+    assert done.code == 0 and "wrote report.html" in done.out
+    page = (trials / "report.html").read_text()
+    assert "<h2>trial0</h2>" in page and "Marker errors: trial1" in page and "Joint angles" in page
+    outside = re.sub(r'srcdoc="[^"]*"', "", page)
+    assert not re.findall(r'(?:src|href)="(?!data:)', outside) and "<script" not in outside
+    viewers = data_of(page)
+    assert [viewer["name"] for viewer in viewers] == ['a <b>"model"'] * 2
+    measured = viewers[0]["motion"]["measured"]
+    assert [marker["name"] for marker in measured["markers"]] == ["one", "two", "three", "four"]
+
+
+def test_what_is_drawn_are_the_tables(trials: Path, loads: Path) -> None:
+    folder = trials / "trial0"
+    outcomes: list[Outcome] = [osimlite.run(folder / "z_ik.xml"), osimlite.run(folder / "id.xml")]
+    trial = Trial("trial0", outcomes)
+    panels = _angles([trial])
+    table = outcomes[0].tables["ik.mot"]
+    drawn = {label.removesuffix(" (deg)"): lines[0].column for label, lines in panels.items()}
+    assert drawn and all(np.allclose(column, table[name], atol=1e-9) for name, column in drawn.items())
+    # The only joint is that to ground, whose forces are residuals.
+    assert _moments([trial]) == {} and trial.evidence is outcomes[0].evidence
+    assert outcomes[1].evidence is not None and outcomes[1].evidence.loads is None
+
+
+def test_nothing_to_report_is_told(tmp_path: Path) -> None:
+    with pytest.raises(OsimliteError, match="none of the setups has a motion"):
+        report({"scale.xml": Outcome()}, tmp_path / "report.html")
