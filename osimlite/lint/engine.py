@@ -25,7 +25,6 @@ from osimlite.lint.measures import MEASURES
 from osimlite.lint.subject import Subject
 from osimlite.lint.suffixes import is_document, is_table
 from osimlite.lint.suppressions import Suppression
-from osimlite.lint.table import Table
 from osimlite.records import dataclass, replace
 from osimlite.schema.base import Object
 from osimlite.schema.model import Model
@@ -217,11 +216,17 @@ def _add(table: dict[str, Rule], rule: Rule) -> None:
     table[rule.code] = rule
 
 
+APART = {"document": ("setup_", "moco"), "table": ("table", "marker_table")}
+"""How the names of modules begin whose rules are about these alone: nobody else loads them."""
+
+
 @cache
-def all_rules() -> tuple[Rule, ...]:
-    """Every rule, by code."""
+def all_rules(about: str = "") -> tuple[Rule, ...]:
+    """Every rule, by code; if it is said what the rules are about, perhaps none that are about something else."""
+    others = tuple(name for kind, names in APART.items() if about not in ("", kind) for name in names)
     for module in iter_modules(rules.__path__):
-        import_module(f"{rules.__name__}.{module.name}")
+        if not module.name.startswith(others):
+            import_module(f"{rules.__name__}.{module.name}")
     return tuple(_RULES[code] for code in sorted(_RULES))
 
 
@@ -245,6 +250,8 @@ def subject_in(source: Source, config: Config | None = None) -> Checked:
     """A text to check; what it is, the name of its file tells."""
     use_classes(config)
     if source.file is not None and is_table(source.file):
+        from osimlite.lint.table import Table
+
         return Table(source.data, source.file, config)
     return _subject_of(survey(source, of=Object if is_document(source.file) else Model), config)
 
@@ -285,7 +292,7 @@ def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Repo
         recall: whether they run too where it was measured before.
     """
     findings: list[Finding] = []
-    wanted = [known for known in all_rules() if subject.config.wants(known) and subject.is_for(known)]
+    wanted = [known for known in all_rules(subject.about) if subject.config.wants(known) and subject.is_for(known)]
     measuring = [known for known in wanted if known.about == MEASURES]
     why_not = ""
     if measuring:

@@ -12,7 +12,7 @@ import pytest
 from osimlite.document.source import Source
 from osimlite.lint import Config, Severity, validate
 from osimlite.lint.baseline import without_baseline, write_baseline
-from osimlite.lint.engine import FAMILIES, Rule, all_rules, groups
+from osimlite.lint.engine import APART, FAMILIES, Rule, all_rules, groups
 from osimlite.lint.pages import index, page_of
 from osimlite.schema.model import CURRENT_VERSION
 
@@ -51,6 +51,12 @@ def example(rule: Rule, heading: str) -> bytes:
 @pytest.mark.parametrize("path", [skeleton.SKELETON, skeleton.LIMB], ids=lambda path: path.stem)
 def test_the_skeleton_is_without_findings(path):
     assert str(validate(path)) == "nothing found"
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_a_module_that_only_some_subjects_load_is_about_these(rule):
+    module = rule.check.__module__.rpartition(".")[2]
+    assert {kind for kind, names in APART.items() if module.startswith(names)} == {rule.about} & {*APART}
 
 
 @pytest.mark.parametrize("rule", RULES)
