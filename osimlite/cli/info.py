@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -28,6 +29,7 @@ def info(
 
     Example: osimlite info gait2392.osim
     """
+    from osimlite.cli._answers import answered
     from osimlite.cli._console import Facts, say
     from osimlite.document.reader import read_document
     from osimlite.document.source import Source
@@ -41,7 +43,8 @@ def info(
     if is_table(str(file)):
         _table(file, everything)
         return
-    document = read_document(Source.of_file(file), of=Object)
+    source = Source.of_file(file)
+    document = read_document(source, of=Object)
     model = document.top
     size = f"{file} ({file.stat().st_size / 1000:.0f} kB)"
     if not isinstance(model, Model):
@@ -76,7 +79,7 @@ def info(
         ("constraints", str(len(model.constraint_set.objects))),
         ("components in all", str(len(components))),
         ("notes on reading", str(len(document.notes))),
-        ("simulation", _simulation(model, file.parent)),
+        ("simulation", answered("simulation", str(file), source.data, partial(_simulation, model, file.parent))),
     ]).show()  # fmt: skip
 
     if any(joint.coordinates for joint in model.components(Joint)):
@@ -200,8 +203,8 @@ def _muscles(muscles: Sequence[Any]) -> Iterator[str]:
             yield f"    {muscle.name:{width}} {muscle.max_isometric_force:>7.5g} N {lengths}  {laid}"
 
 
-def _simulation(model: Model, folder: Path) -> str:
-    """What of a model cannot be simulated."""
+def _simulation(model: Model, folder: Path) -> tuple[str, bool]:
+    """What of a model cannot be simulated, and whether that follows from its file alone."""
     from osimlite._require import require
     from osimlite.errors import OsimliteError
     from osimlite.text import listed
@@ -216,7 +219,10 @@ def _simulation(model: Model, folder: Path) -> str:
         # What moves no mass has no acceleration.
         mechanism.acceleration(*mechanism.default_state())
     except OsimliteError as error:
-        return f"not possible: {error}"
+        return f"not possible: {error}", False
+    answer = "possible, nothing is left out"
     if forces.skipped:
-        return f"not without leaving out (--skip-unsupported) {listed(by_class(forces.skipped))}"
-    return "possible, nothing is left out"
+        answer = f"not without leaving out (--skip-unsupported) {listed(by_class(forces.skipped))}"
+    # Objects that stand in files of their own belong to the model, too.
+    is_alone = not any(item.layout is not None and item.layout.include is not None for item in model.walk())
+    return answer, is_alone and not forces.reads_files

@@ -25,6 +25,31 @@ def test_info_breaks_no_name_and_says_units():
     assert any("8 Coordinate," in line for line in lines) and max(map(len, lines)) <= 80
 
 
+def test_info_says_of_a_changed_model_anew_whether_it_can_be_simulated(tmp_path, own_cache):
+    file, text = tmp_path / "walker.osim", WALKER.read_text()
+
+    def said() -> str:
+        return next(line.split(None, 1)[1] for line in run("info", file).out.splitlines() if "simulation" in line)
+
+    def answers() -> list[Path]:
+        return list(own_cache.rglob("answers/*.json"))
+
+    file.write_text(text)
+    assert said() == "possible, nothing is left out"
+    (kept,) = answers()
+    kept.write_text(kept.read_text().replace("possible", "known to be possible"))
+    assert said() == "known to be possible, nothing is left out"
+    for damage in ("[", "{}", "[1, 2]", "[" * 100_000):
+        kept.write_text(damage)
+        assert said() == "possible, nothing is left out"
+    file.write_text(text.replace("CoordinateLimitForce", "CoordinateLimitForse"))
+    assert said().startswith("not without leaving out")
+    assert len(answers()) == 1
+    # What else it needs is looked at every time.
+    file.write_text(text.replace("<mass>", "<mass>nan "))
+    assert said().startswith("not possible") and len(answers()) == 1 and "left out" not in said()
+
+
 def test_info_of_a_setup_file_names_its_files(fixtures):
     rows = [line.split(None, 1) for line in run("info", fixtures / "documents" / "analyze.xml").out.splitlines()]
     assert ["AnalyzeTool", "walk"] in [[word.strip() for word in row] for row in rows]

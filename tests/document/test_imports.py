@@ -54,6 +54,7 @@ def test_importing_the_package_alone_imports_nothing_of_weight() -> None:
         (("validate", "walker.osim", "--no-cache"), {"numpy", "osimlite.multibody.mechanism"}),
         (("validate", "walker.osim", "--no-cache"), {"osimlite.lint.table", "osimlite.lint.setup", "osimlite.tables"}),
         (("info", "walker.osim"), {"typer", "rich", "rapidfuzz", "numba", "llvmlite"}),
+        (("info", "walker.osim"), {"numpy", "osimlite.multibody.mechanism"}),
         (("simulate", "walker.osim", "--to", "0.1", "-o", "r"), {"typer", "rich", "numba", "osimlite.lint"}),
     ],
 )

@@ -1,0 +1,40 @@
+"""Answers that take long to find and follow from a text alone: kept where the linter keeps its findings."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from hashlib import blake2b
+from zlib import crc32
+
+from osimlite import __version__
+from osimlite.errors import OsimliteError
+from osimlite.files import read_file, write_atomically
+from osimlite.lint.cache import folder_for, key_of
+from osimlite.lint.config import Config
+
+
+def answered(question: str, file: str, data: bytes, find: Callable[[], tuple[str, bool]]) -> str:
+    """What was found for a text before, by this very osimlite, or what is found now.
+
+    Args:
+        question: what is asked.
+        file: where the text stands.
+        data: the text.
+        find: finds the answer, and whether it follows from the text alone.
+    """
+    key = [question, key_of(file, Config()), blake2b(data).hexdigest()]
+    place = crc32(f"{question} {os.path.abspath(file)}".encode(errors="surrogateescape"))
+    kept = folder_for(None) / __version__ / "answers" / f"{place:08x}.json"
+    with suppress(OsimliteError, ValueError, RecursionError):
+        match json.loads(read_file(kept)):
+            case [known, str(answer)] if known == key:
+                return answer
+    answer, lasts = find()
+    if lasts:
+        with suppress(OsimliteError, OSError):
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            write_atomically(kept, json.dumps([key, answer]))
+    return answer
