@@ -92,7 +92,9 @@ def rotation_of(quaternions: ArrayLike) -> Array:
     """Rotation matrices (..., 3, 3) of quaternions (..., 4), scalar first, whatever their lengths; NaN for zeros."""
     given = np.asarray(quaternions, dtype=float)
     with np.errstate(invalid="ignore"):
-        w, x, y, z = np.moveaxis(given / np.linalg.norm(given, axis=-1, keepdims=True), -1, 0)
+        # The square of a long or short one is no number.
+        near = given / np.abs(given).max(axis=-1, keepdims=True)
+        w, x, y, z = np.moveaxis(near / np.linalg.norm(near, axis=-1, keepdims=True), -1, 0)
     return np.stack(
         (
             np.stack((w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)), -1),

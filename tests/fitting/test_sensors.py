@@ -65,6 +65,8 @@ def test_quaternions_and_matrices_are_the_same_rotations() -> None:
     assert np.linalg.det(matrices) == pytest.approx(np.ones(30))
     unit = given / np.linalg.norm(given, axis=1)[:, None]
     assert np.abs(np.sum(quaternion(matrices) * unit, axis=1)) == pytest.approx(np.ones(30), abs=1e-14)
+    for length in (1e-300, 1e-5, 1e300):
+        assert rotation_of(length * unit) == pytest.approx(matrices, abs=1e-12)
     assert rotation_about_space((0.3, 0.4, 0.5)) == pytest.approx(
         turned(0.0, 0.0, 0.5) @ turned(0.0, 0.4, 0.0) @ turned(0.3, 0.0, 0.0)
     )
