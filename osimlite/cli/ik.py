@@ -1,4 +1,4 @@
-"""``osimlite ik``: the motion of a model that fits measured markers."""
+"""``osimlite ik``: the motion of a model that fits measured markers or orientations."""
 
 from __future__ import annotations
 
@@ -12,10 +12,16 @@ from osimlite.cli._command import Argument, Option, command
 @command
 def ik(
     file: options.File,
-    trial: Annotated[Path, Argument(help="Measured markers: .trc, .c3d, or .sto.", show_default=False)],
+    trial: Annotated[
+        Path, Argument(help="Measured markers: .trc, .c3d, .sto; or orientations: .sto.", show_default=False)
+    ],
     weight: Annotated[
         list[str] | None,
-        Option("--weight", metavar="MARKER=NUMBER", help="How much a marker counts; 1 if left out, 0 for nothing."),
+        Option(
+            "--weight",
+            metavar="NAME=NUMBER",
+            help="How much a marker or sensor counts; 1 if left out, 0 for none.",
+        ),
     ] = None,
     keep: Annotated[
         list[str] | None,
@@ -34,7 +40,8 @@ def ik(
 
     Each frame is the pose with the least weighted mean of squared distances, to the last digits. Locked coordinates
     stay at their defaults, clamped ones in their ranges. ik.mot has degrees, as OpenSim's; marker_errors.sto how far
-    each marker is from where it was measured (m).
+    each marker is from where it was measured (m). Of a table of quaternions, the orientations of sensors, the angles
+    are least, and orientation_errors.sto has them (rad).
 
     Example: osimlite ik gait2392.osim walk.trc --weight RASI=10 -o results
     """
@@ -43,22 +50,33 @@ def ik(
     from osimlite.files import make_folder, write_atomically
     from osimlite.fitting.ik_tool import motion_table, told
     from osimlite.fitting.inverse_kinematics import inverse_kinematics
+    from osimlite.fitting.orientation_data import holds_orientations
     from osimlite.simulation.files.old_storage import UNITS, printed
     from osimlite.simulation.files.storage import write_sto
 
     weights = {name: _number(text, name) for name, text in options.named_words(weight, "--weight").items()}
     kept = {name: _number(text, name) for name, text in options.named_words(keep, "--keep").items()}
+    of_sensors = holds_orientations(trial)
     motion = inverse_kinematics(
-        read(file), trial, weights=weights, coordinates=kept, constraints=not free, start=first, end=last
+        read(file),
+        None if of_sensors else trial,
+        orientations=trial if of_sensors else None,
+        weights=weights,
+        coordinates=kept,
+        constraints=not free,
+        start=first,
+        end=last,
     )
     folder = options.results_folder(file, output)
     make_folder(folder)
     write_atomically(folder / "ik.mot", "".join(printed(motion_table(motion), f"\n{UNITS}")))
-    errors = motion.marker_errors.tolist()
-    write_sto(folder / "marker_errors.sto", "marker errors", motion.times.tolist(), motion.markers, errors)
+    what, names, errors = "marker", motion.markers, motion.marker_errors
+    if of_sensors:
+        what, names, errors = "orientation", motion.sensors, motion.orientation_errors
+    write_sto(folder / f"{what}_errors.sto", f"{what} errors", motion.times.tolist(), names, errors.tolist())
     for line in told(motion):
         say(line)
-    say(f"wrote {folder / 'ik.mot'} and {folder / 'marker_errors.sto'}")
+    say(f"wrote {folder / 'ik.mot'} and {folder / f'{what}_errors.sto'}")
 
 
 def _number(text: str, name: str) -> float:

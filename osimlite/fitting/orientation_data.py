@@ -13,6 +13,7 @@ from osimlite.fitting.recorded import Recording
 from osimlite.multibody.spatial import Array, rotation_about_space, rotation_of
 from osimlite.records import dataclass, replace
 from osimlite.simulation.files.storage import read_sto
+from osimlite.simulation.files.table_stream import TableStream
 
 KIND = "Quaternion"
 """What a table of orientations holds."""
@@ -77,6 +78,14 @@ def rotations(values: ArrayLike, what: str) -> Array:
             f"{' × '.join(map(str, given.shape)) or 'one number'}"
         )
     return given
+
+
+def holds_orientations(path: str | Path) -> bool:
+    """Whether a file is a table of quaternions; errors as those of :class:`TableStream`."""
+    if Path(path).suffix.lower() != ".sto":
+        return False
+    with TableStream(path) as stream:
+        return stream.kind == KIND
 
 
 def read_orientations(path: str | Path) -> OrientationData:

@@ -14,7 +14,7 @@ from osimlite.errors import DocumentError, OsimliteError, SettingError
 from osimlite.fitting.orientation_data import OrientationData
 from osimlite.fitting.sensors import place_sensors
 from osimlite.multibody.spatial import quaternion, rotation_about_space, rotation_of, rotation_xyz
-from osimlite.simulation.files.storage import write_sto
+from osimlite.simulation.files.storage import read_sto, write_sto
 from osimlite.simulation.files.trc import write_trc
 from tests.cli.command import run
 
@@ -296,3 +296,12 @@ def test_a_misspelt_marker_is_told_with_its_line_before_the_run(lab: Path) -> No
     line = (lab / "ik.xml").read_text().split("thihg0")[0].count("\n") + 1
     done = run("run", "ik.xml", folder=lab)
     assert done.code == 0 and f"ik.xml:{line}:" in done.err and "thihg0" in done.err, done.err
+
+
+def test_the_command_takes_orientations(lab: Path) -> None:
+    osimlite.write(worn(), lab / "worn.osim")
+    done = run("ik", "worn.osim", "standing.sto", "--weight", "thigh_imu=2", "-o", "out", folder=lab)
+    assert (done.code, done.err) == (0, "") and "2 sensors: errors of 0.00 degrees" in done.out
+    errors = read_sto(lab / "out" / "orientation_errors.sto")
+    assert errors.columns == ("thigh_imu", "shank_imu") and errors.rows == pytest.approx(np.zeros((1, 2)), abs=1e-8)
+    assert read_sto(lab / "out" / "ik.mot").in_degrees
