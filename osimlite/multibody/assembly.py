@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from osimlite.errors import SimulationError
+from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.kinematics import Kinematics, kinematics
 from osimlite.multibody.linear import solutions, stacked
 from osimlite.multibody.spatial import Array
@@ -122,7 +123,11 @@ class _Search:
         self.tolerance = max(mechanism.assembly_accuracy / 10.0, _FINEST)
         # OpenSim leaves such a pose as it is; its integrator takes the shortest way to the constraints.
         self.assembled = bool(np.abs(_errors(self._state(self.start))).max(initial=0.0) <= self.tolerance)
-        # Otherwise what does not count gives way first.
+        # Otherwise what does not count gives way first; what depends on others follows them.
+        if not self.assembled:
+            for item in mechanism.constraints:
+                if isinstance(item, Coupler) and item.dependent in self.free and not self.counted[item.dependent]:
+                    self.start[item.dependent] = item.function.evaluate(self.start[list(item.independent)])[0]
         self.ease = np.where(self.assembled | (self.counted[self.free] > 0.0), 1.0, _EASE)
 
     def cost(self, q: Array) -> float:
