@@ -16,7 +16,7 @@ from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.schema.model import Model
 from osimlite.schema.prescribed import ExternalLoads
-from osimlite.simulation.files.storage import read_sto
+from osimlite.simulation.elements.external_loads import loads_table
 
 ON_GROUND = 20.0
 """A foot that is pushed up by more stands, N."""
@@ -39,6 +39,8 @@ class Evidence:
         measured: where they were (t, m, 3), m; NaN where one was not seen.
         places: where they are in the model (t, m, 3), m.
         loads: the file of measured loads.
+        sensors: names of the k sensors that were fitted.
+        angles: how far they are turned from where they were measured (t, k), rad; NaN where one was not.
     """
 
     model: Model
@@ -51,6 +53,8 @@ class Evidence:
     measured: Array | None = None
     places: Array | None = None
     loads: Path | None = None
+    sensors: Sequence[str] = ()
+    angles: Array | None = None
 
     @classmethod
     def of(cls, model: Model, file: Path, mechanism: Mechanism, times: Array, values: Array, **more: Any) -> Evidence:
@@ -83,8 +87,7 @@ def steps_of(loads: Path, up: int) -> dict[str, Steps]:
         OsimliteError: it, or its data, cannot be read.
     """
     document = read_object(loads, ExternalLoads)
-    beside = loads.parent / document.datafile.strip()
-    table = read_sto(beside if beside.exists() else Path(document.datafile.strip()))
+    table = loads_table(document, loads.parent, str(loads))
     found: dict[str, Array] = {}
     for force in document.objects:
         side, label = side_of(str(force.applied_to_body))[1], f"{(force.force_identifier or '').strip()}{'xyz'[up]}"

@@ -14,6 +14,7 @@ from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.tools.inverse_kinematics import IMUInverseKinematicsTool
 from osimlite.simulation.files.storage import StoTable
 from osimlite.text import listed
+from osimlite.tools.evidence import Evidence
 from osimlite.tools.job import NONE, Job
 from osimlite.tools.outcome import Outcome
 
@@ -47,6 +48,10 @@ def run(job: Job, outcome: Outcome) -> None:
             outcome.new_table(job.result(str(Path(beside) / place)), table)
     if not outcome.tables:
         outcome.tell("nothing written", "the setup names neither a results_directory nor an output_motion_file")
+    outcome.evidence = Evidence.of(
+        model, job.needed("model_file"), motion.mechanism, motion.times, motion.values,
+        sensors=motion.sensors, angles=motion.orientation_errors,
+    )  # fmt: skip
     outcome.summary |= motion.summary
     for words in told(motion):
         outcome.tell("sensors", words)

@@ -1,4 +1,4 @@
-"""A report of trials as one page: the motion with its markers, angles, moments, residuals, errors of markers."""
+"""A report of trials as one page: the motion with its markers, angles, moments, residuals, errors of the fit."""
 
 from __future__ import annotations
 
@@ -269,30 +269,43 @@ def _residuals(trial: Trial, name: str) -> Iterator[str]:
 
 def _errors(trial: Trial, name: str) -> Iterator[str]:
     evidence = trial.evidence
-    if evidence is None or evidence.measured is None or evidence.places is None or not evidence.markers:
+    if evidence is None:
         return
-    errors = 100.0 * np.linalg.norm(evidence.places - evidence.measured, axis=2)
+    if evidence.measured is not None and evidence.places is not None and evidence.markers:
+        errors = 100.0 * np.linalg.norm(evidence.places - evidence.measured, axis=2)
+        figure = _errors_over(evidence.times, evidence.markers, errors, "marker", "cm", [100.0 * end for end in ADVICE])
+        note = "Dashed: what OpenSim advises at most, 2 cm for the root mean square and 4 cm for the largest."
+        yield f'<h2>Marker errors{html.escape(name)}</h2><p class="note">{note}</p>{_image(figure)}'
+    if evidence.angles is not None and evidence.sensors:
+        figure = _errors_over(evidence.times, evidence.sensors, np.degrees(evidence.angles), "sensor", "deg", ())
+        note = "Angles from the measured orientations."
+        yield f'<h2>Sensor errors{html.escape(name)}</h2><p class="note">{note}</p>{_image(figure)}'
+
+
+def _errors_over(
+    times: Array, names: Sequence[str], errors: Array, noun: str, unit: str, limits: Sequence[float]
+) -> Any:
+    """Errors (t, m) over time, with limits of the root mean square and the largest, and the worst by name."""
     seen = np.isfinite(errors)
     filled = np.where(seen, errors, 0.0)
     rms = np.sqrt((filled**2).sum(axis=1) / np.maximum(seen.sum(axis=1), 1))
     figure = figure_of("", (11.0, 3.4))
     over, beside = figure.subplots(1, 2, width_ratios=(2, 1))
-    over.plot(evidence.times, rms, color=COLORS[0], lw=1.6, label="root mean square")
-    over.plot(evidence.times, filled.max(axis=1), color=COLORS[1], lw=1.2, label="largest")
-    for limit, color in zip(ADVICE, COLORS, strict=False):
-        over.axhline(100.0 * limit, color=color, lw=0.8, ls="--")
-    over.set_ylabel("marker error (cm)")
+    over.plot(times, rms, color=COLORS[0], lw=1.6, label="root mean square")
+    over.plot(times, filled.max(axis=1), color=COLORS[1], lw=1.2, label="largest")
+    for limit, color in zip(limits, COLORS, strict=False):
+        over.axhline(limit, color=color, lw=0.8, ls="--")
+    over.set_ylabel(f"{noun} error ({unit})")
     over.set_ylim(bottom=0.0)
     over.legend(frameon=False, fontsize=8)
     _tidy(over, "time (s)")
     each = np.sqrt((filled**2).sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
     worst = np.argsort(-each)[:WORST][::-1]
-    beside.barh([evidence.markers[place] for place in worst], each[worst], color=COLORS[0], height=0.7)
+    beside.barh([names[place] for place in worst], each[worst], color=COLORS[0], height=0.7)
     beside.tick_params(axis="y", labelsize=8)
-    beside.set_title("worst markers", fontsize=10, loc="left")
-    _tidy(beside, "root mean square (cm)")
-    note = "Dashed: what OpenSim advises at most, 2 cm for the root mean square and 4 cm for the largest."
-    yield f'<h2>Marker errors{html.escape(name)}</h2><p class="note">{note}</p>{_image(figure)}'
+    beside.set_title(f"worst {noun}s", fontsize=10, loc="left")
+    _tidy(beside, f"root mean square ({unit})")
+    return figure
 
 
 def _legend(figure: Any, lines: Sequence[_Line]) -> None:

@@ -305,3 +305,13 @@ def test_the_command_takes_orientations(lab: Path) -> None:
     errors = read_sto(lab / "out" / "orientation_errors.sto")
     assert errors.columns == ("thigh_imu", "shank_imu") and errors.rows == pytest.approx(np.zeros((1, 2)), abs=1e-8)
     assert read_sto(lab / "out" / "ik.mot").in_degrees
+
+
+def test_a_report_has_the_errors_of_the_sensors(lab: Path) -> None:
+    pytest.importorskip("matplotlib", reason="needs matplotlib (extra 'plot')")
+    osimlite.write(worn(), lab / "worn.osim")
+    (lab / "tracker.xml").write_text(TRACKER.replace("tigh_imu", "thigh_imu"))
+    done = run("run", "tracker.xml", "--report", "report.html", folder=lab)
+    assert (done.code, done.err) == (0, "")
+    page = (lab / "report.html").read_text()
+    assert "<h2>Sensor errors" in page and "<h2>Marker errors" not in page

@@ -46,7 +46,7 @@ def read_external_loads(mechanism: Mechanism, path: str | Path) -> tuple[Declare
             no three columns for an identifier.
     """
     loads, file = read_object(path, ExternalLoads), str(path)
-    columns = _data(loads, Path(path).parent, file)
+    columns = _Columns(loads_table(loads, Path(path).parent, file))
     forces = (force for force in loads.objects if force.appliesForce)
     return tuple(
         external_load(f"/componentset/{loads.name}/{force.name}", force.name, _load(mechanism, force, columns, file))
@@ -63,17 +63,21 @@ def load_in_model(builder: ElementBuilder, force: ExternalForce) -> Load:
     loads: Any = builder.tree.parent_of(force)
     if not isinstance(loads, ExternalLoads):
         raise builder.unsupported(force, " outside of ExternalLoads, so that it has no data file")
-    columns = _data(loads, builder.folder, builder.path(loads))
+    columns = _Columns(loads_table(loads, builder.folder, builder.path(loads)))
     return _load(builder.mechanism, force, columns, builder.path(loads))
 
 
-def _data(loads: ExternalLoads, folder: Path, file: str) -> _Columns:
-    """The data of some loads, looked for in a folder first."""
+def loads_table(loads: ExternalLoads, folder: Path, file: str) -> StoTable:
+    """The data of some loads, looked for in a folder first.
+
+    Raises:
+        DocumentError: they name no data file, or it cannot be read.
+    """
     name = loads.datafile.strip()
     if not name:
         raise DocumentError("it names no data file; give it a <datafile>", file=file)
     path = beside(folder, name)
-    return _Columns(read_c3d_forces(path) if path.suffix.lower() == ENDING else read_sto(path))
+    return read_c3d_forces(path) if path.suffix.lower() == ENDING else read_sto(path)
 
 
 def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: str) -> Load:
