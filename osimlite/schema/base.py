@@ -302,10 +302,11 @@ class Unknown(ModelComponent, abstract=True):
         return ObjectList()
 
 
-# Pydantic evaluates the annotations of all bases for every class; evaluated here once, they cost it nothing.
+# Pydantic evaluates the annotations of all bases for every class, but those of their fields: evaluated here once, they
+# cost it little. What is no field it has noted for all classes below.
 for _base in (Object, Component):
     _hints = get_type_hints(_base, include_extras=True)
-    _base.__annotations__.update({name: _hints[name] for name in _base.__annotations__})
+    _base.__annotations__ = {name: _hints[name] for name in _base.__annotations__ if name in _base.model_fields}
 
 _set = object.__setattr__
 
