@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -60,6 +61,7 @@ def info(
     wraps = [component for component in components if is_a(component, "PathWrap")]
     surfaces = sum(is_a(component, "WrapObject") for component in components)
     mass = sum(body.mass for body in model.body_set.objects)
+    simulation = partial(_simulation, model, file.parent, source.text)
 
     Facts(rows=[
         ("model", model.name),
@@ -79,7 +81,7 @@ def info(
         ("constraints", str(len(model.constraint_set.objects))),
         ("components in all", str(len(components))),
         ("notes on reading", str(len(document.notes))),
-        ("simulation", answered("simulation", str(file), source.data, partial(_simulation, model, file.parent))),
+        ("simulation", answered("simulation", str(file), source.data, simulation)),
     ]).show()  # fmt: skip
 
     if any(joint.coordinates for joint in model.components(Joint)):
@@ -203,7 +205,7 @@ def _muscles(muscles: Sequence[Any]) -> Iterator[str]:
             yield f"    {muscle.name:{width}} {muscle.max_isometric_force:>7.5g} N {lengths}  {laid}"
 
 
-def _simulation(model: Model, folder: Path) -> tuple[str, bool]:
+def _simulation(model: Model, folder: Path, text: str) -> tuple[str, bool]:
     """What of a model cannot be simulated, and whether that follows from its file alone."""
     from osimlite._require import require
     from osimlite.errors import OsimliteError
@@ -223,6 +225,5 @@ def _simulation(model: Model, folder: Path) -> tuple[str, bool]:
     answer = "possible, nothing is left out"
     if forces.skipped:
         answer = f"not without leaving out (--skip-unsupported) {listed(by_class(forces.skipped))}"
-    # Objects that stand in files of their own belong to the model, too.
-    is_alone = not any(item.layout is not None and item.layout.include is not None for item in model.walk())
-    return answer, is_alone and not forces.reads_files
+    # An element with this attribute stands in a file of its own.
+    return answer, not forces.reads_files and re.search(r"\sfile\s*=", text) is None

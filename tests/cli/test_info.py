@@ -45,7 +45,14 @@ def test_info_says_of_a_changed_model_anew_whether_it_can_be_simulated(tmp_path,
     file.write_text(text.replace("CoordinateLimitForce", "CoordinateLimitForse"))
     assert said().startswith("not without leaving out")
     assert len(answers()) == 1
-    # What else it needs is looked at every time.
+    # What stands in other files is looked at every time.
+    start, end = text.index("<ForceSet"), text.index("</ForceSet>") + len("</ForceSet>")
+    forces = f'<OpenSimDocument Version="40500">{text[start:end]}</OpenSimDocument>'
+    file.write_text(f'{text[:start]}<ForceSet file="forces.xml"/>{text[end:]}')
+    (tmp_path / "forces.xml").write_text(forces)
+    assert said() == "possible, nothing is left out"
+    (tmp_path / "forces.xml").write_text(forces.replace("CoordinateLimitForce", "CoordinateLimitForse"))
+    assert said().startswith("not without leaving out")
     file.write_text(text.replace("<mass>", "<mass>nan "))
     assert said().startswith("not possible") and len(answers()) == 1 and "left out" not in said()
 
