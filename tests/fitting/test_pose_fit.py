@@ -355,3 +355,16 @@ def test_the_first_pose_has_no_whole_turns(goal: bool) -> None:
         poses = fit.fit(np.array([[*places_at(mechanism, markers, q).ravel(), 0.0]]), q=np.zeros(3))
         assert np.abs(poses.values).max() <= np.pi + (0.05 if goal else 1e-8) and not poses.unsettled
         assert poses.costs[0] <= (0.5e-4 * np.pi**2 if goal else 1e-20)
+
+
+def test_a_subject_may_face_anywhere() -> None:
+    """A range that ends just before half a turn is no wall on the way to the first pose."""
+    free = _free_body()
+    infos = tuple(replace(info, clamped=True, range=(-3.14, 3.14)) for info in free.coordinates[:3])
+    mechanism = replace(free, coordinates=(*infos, *free.coordinates[3:]))
+    markers = markers_of(mechanism, np.random.default_rng(0))
+    fit = PoseFit(mechanism, markers)
+    for heading in np.linspace(-3.0, 3.0, 25):
+        q = np.array((0.1, heading, -0.2, 2.0, 1.0, -1.0))
+        poses = fit.fit(places_at(mechanism, markers, q).reshape(1, -1), q=np.zeros(6))
+        assert poses.costs[0] < 1e-18, heading

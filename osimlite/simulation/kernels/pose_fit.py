@@ -10,8 +10,19 @@ from __future__ import annotations
 
 from math import floor, inf, pi
 
-from osimlite.forces.vectors import put
-from osimlite.simulation.kernels.layout import FREEDOMS, OK
+from osimlite.forces.vectors import dot, put, vector
+from osimlite.simulation.kernels.layout import (
+    END_FREEDOM,
+    FIRST_FREEDOM,
+    FREEDOMS,
+    GRAVITY_AT,
+    LINK_AT,
+    LINK_INTS,
+    LINKS,
+    OK,
+    PARENT,
+    WORK_COLUMN,
+)
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import station
 from osimlite.simulation.kernels.pose_bonds import bend_equations, forget_bends, settle
@@ -62,6 +73,9 @@ POSES = 2
 """How many poses are kept to go on from."""
 INWARDS = 0.3
 """How far from the ends of their ranges coordinates begin when a better pose is looked for (rad or m)."""
+ROUND = 0.75 * pi
+"""By how much the first pose is turned in ground, to either side, when a better one is looked for (rad): a range may
+reach to just before half a turn."""
 RENEWED = 5
 """After how many steps the second derivatives of the equations are found anew, which not every pose needs."""
 
@@ -150,6 +164,10 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
             move_inwards(m, last, start, 2.0 * INWARDS * (1 + inwards))
             value, more, status = descend_again(m, start, y, value, status, SMALL_STEPS, lightest)
             steps += more
+        for number in range(2 * size):
+            if turn_round(m, last, start, number // 2, ROUND if number % 2 == 0 else -ROUND):
+                value, more, status = descend_again(m, start, y, value, status, SMALL_STEPS, lightest)
+                steps += more
     if leave_ends(m, y, start):
         value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
         steps += more
@@ -213,6 +231,25 @@ def move_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> No
         if low < high:
             inner = min(inwards, 0.5 * (high - low))
             start[k] = min(max(start[k], low + inner), high - inner)
+
+
+def turn_round(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: float) -> bool:
+    """A pose in which what a joint to ground carries is turned about the vertical; false if this is no such coordinate.
+
+    Subjects walk to and fro, and the way down from half a turn away may lead elsewhere.
+    """
+    s, p, ranges, is_first = m.s, m.p, at(m.c, m.p[RANGES_AT]), False
+    for link in range(s[LINKS]):
+        j = at(s, s[LINK_AT] + LINK_INTS * link)
+        is_first = is_first or (j[PARENT] < 0 and j[FIRST_FREEDOM] <= freedom < j[END_FREEDOM])
+    move_inwards(m, from_pose, start, 2.0 * INWARDS)
+    start[freedom] += angle
+    is_inside = ranges[2 * freedom] <= start[freedom] <= ranges[2 * freedom + 1]
+    if not (is_first and is_inside and p[p[RESOLVED_AT] + freedom] in (VARIABLE, AT_END)):
+        return False
+    look(m, from_pose)
+    down, turn = vector(m.x, GRAVITY_AT), vector(at(m.w, s[WORK_COLUMN]), 6 * freedom)
+    return dot(turn, turn) > 0.0 and 2.0 * dot(turn, down) ** 2 >= dot(turn, turn) * dot(down, down)
 
 
 def leave_ends(m: Fit, y: Floats, start: Floats) -> bool:
