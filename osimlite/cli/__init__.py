@@ -105,7 +105,7 @@ def _run(words: list[str]) -> None:
     from osimlite.errors import DoubtfulWarning, OsimliteError, UnitWarning
 
     # What is imported makes many objects and drops none: the collector would look through them again and again.
-    gc.set_threshold(100_000)
+    gc.set_threshold(300_000)
     # What draws tables takes any width at its word.
     width = os.environ.get("COLUMNS", "")
     if not (width.isdecimal() and len(width) < 5 and int(width)):
