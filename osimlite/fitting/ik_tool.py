@@ -26,6 +26,7 @@ from osimlite.schema.tools.inverse_kinematics import (
     InverseKinematicsTool,
 )
 from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.simulation.files.times import both_of
 from osimlite.text import counted, did_you_mean, listed
 
 UNNAMED = ("", "Unassigned")
@@ -100,7 +101,7 @@ def run_inverse_kinematics(
     tool: InverseKinematicsTool, model: Model, data: MarkerData, coordinates: StoTable | None = None
 ) -> FittedMotion:
     """What the tool computes, for a model and data that are read already; errors as those of `tasks_of`."""
-    first, last = tool.time_range
+    first, last = both_of(tool.time_range)
     frames = data.between(first, last)
     mechanism = build_mechanism(model)
     tasks = tasks_of(model, mechanism, tool.ik_task_set.objects, frames, coordinates)

@@ -29,6 +29,7 @@ from osimlite.schema.tools.scale import (
     Scale,
     ScaleTool,
 )
+from osimlite.simulation.files.times import both_of
 from osimlite.text import did_you_mean
 
 MEASUREMENTS, BY_HAND = "measurements", "manualScale"
@@ -146,7 +147,7 @@ def run_scale(tool: ScaleTool, folder: Path) -> Scaled:
     if placer.apply and placer.marker_file not in UNNAMED:
         data = MarkerData.of(folder / placer.marker_file)
         coordinates = coordinate_table(placer.coordinate_file, folder)
-        first, last = placer.time_range
+        first, last = both_of(placer.time_range)
         result.placed = place_markers(model, data, placer.ik_task_set.objects, first, last, coordinates)
         _put(result, placer.output_model_file, model)
         _put(result, placer.output_marker_file, model.marker_set)
@@ -163,7 +164,7 @@ def _scaled(tool: ScaleTool, model: Model, folder: Path) -> Measured:
             if scaler.marker_file in UNNAMED:
                 raise SettingError("the model is scaled by measurements, and ModelScaler has no marker_file; name one")
             data = MarkerData.of(folder / scaler.marker_file)
-            measuring.by_measurements(scaler.measurement_set.objects, data, *scaler.time_range)
+            measuring.by_measurements(scaler.measurement_set.objects, data, *both_of(scaler.time_range))
         elif word == BY_HAND:
             measuring.by_hand(scaler.scale_set.objects)
         elif word != MEASUREMENTS:

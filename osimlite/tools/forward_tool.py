@@ -8,7 +8,7 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.tools.dynamics import ForwardTool
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.files.storage import StoTable
-from osimlite.simulation.run import Simulation
+from osimlite.simulation.run import MOST_STEPS, Simulation
 from osimlite.tools.job import Job
 from osimlite.tools.motion import Motion
 from osimlite.tools.outcome import Outcome
@@ -32,6 +32,8 @@ def run(job: Job, outcome: Outcome) -> None:
         start, y = _start(job, outcome, simulation)
         if not start < setup.final_time:
             raise job.error(f"the final_time {setup.final_time:g} s does not come after the start at {start:g} s")
+        if setup.final_time - start > MOST_STEPS * bounds[1]:
+            raise job.error(f"the final_time {setup.final_time:g} s is too far away for steps of {bounds[1]:g} s")
         settings = Settings(setup.integrator_error_tolerance, step_bounds=bounds)
         times, states, failure = simulation.every_step(start, y, setup.final_time, settings)
         outcome.done = failure is None

@@ -13,6 +13,7 @@ from osimlite.records import replace
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.tools.inverse_kinematics import IMUInverseKinematicsTool
 from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.files.times import both_of
 from osimlite.text import listed
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.job import NONE, Job
@@ -26,7 +27,7 @@ def run(job: Job, outcome: Outcome) -> None:
     """Fit every frame to its minimum; write coordinates, and angles of the sensors from their data where asked for."""
     setup: IMUInverseKinematicsTool = job.setup
     model, file = job.model(), job.needed("orientations_file")
-    data = OrientationData.of(file).between(*setup.time_range).turned(setup.sensor_to_opensim_rotations)
+    data = OrientationData.of(file).between(*both_of(setup.time_range)).turned(setup.sensor_to_opensim_rotations)
     frames = {frame.name for frame in model.components(PhysicalFrame)} & {*data.names}
     weights = {item.name: item.weight for item in reversed(setup.orientation_weights.objects) if item.name in frames}
     motion = inverse_kinematics(model, orientations=data, weights=weights)

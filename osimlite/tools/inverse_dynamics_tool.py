@@ -12,6 +12,7 @@ from osimlite.schema.tools.dynamics import InverseDynamicsTool
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.files.recorded import RecordedMotion, exclude_forces
 from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.files.times import both_of
 from osimlite.text import did_you_mean
 from osimlite.tools.evidence import Evidence, root_of
 from osimlite.tools.job import Job
@@ -30,7 +31,7 @@ def run(job: Job, outcome: Outcome) -> None:
     if cutoff >= 0.0:
         # OpenSim takes what its filter adds for part of the motion.
         recorded = recorded.lowpassed(cutoff, continued=True)
-    recorded = recorded.between(*setup.time_range)
+    recorded = recorded.between(*both_of(setup.time_range))
     exclude_forces(model, map(str, setup.forces_to_exclude))
     loads = job.path("external_loads_file")
     forces = force_elements(model, recorded.mechanism, external_loads=loads, folder=None)

@@ -6,11 +6,21 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from osimlite.errors import SimulationError
 from osimlite.files import make_folder, written_atomically
 from osimlite.records import dataclass, field, replace
 from osimlite.simulation.files.old_storage import PRECISION, printed
 from osimlite.simulation.files.storage import StoTable, adapter_lines
 from osimlite.tools.evidence import Evidence
+
+DYNAMICS = "Inverse Dynamics Generalized Forces"
+"""The name of the table that inverse dynamics gives."""
+
+
+def _endless(what: str, time: float) -> SimulationError:
+    return SimulationError(f"{what} at {time:g} s; look for a number in the data that is far too large")
 
 
 @dataclass(eq=False)
@@ -61,12 +71,25 @@ class Outcome:
         """Say something of what came out."""
         self.told.append((name, words))
 
+    def _require_numbers(self) -> None:
+        """Refuse motions that are no numbers, and infinite numbers. Unseen markers and some muscles have none."""
+        motion = self.evidence
+        if motion is not None and not np.isfinite(motion.values).all():
+            row, place = np.argwhere(~np.isfinite(motion.values))[0]
+            raise _endless(f"'{motion.coordinates[place]}' is {motion.values[row, place]}", motion.times[row])
+        for table in self.tables.values():
+            odd = ~np.isfinite(table.rows) if table.name == DYNAMICS else np.isinf(table.rows)
+            if odd.any():
+                row, place = np.argwhere(odd)[0]
+                raise _endless(f"'{table.columns[place]}' is {table.rows[row, place]}", table.times[row])
+
     def write(self) -> None:
         """Write what is still to be written, each file whole or not at all.
 
         Raises:
-            OsimliteError: a file cannot be written.
+            OsimliteError: a file cannot be written, or results are no numbers any more; then nothing is written.
         """
+        self._require_numbers()
         for path, lines in self._texts.items():
             make_folder(path.parent)
             with written_atomically(path) as stream:

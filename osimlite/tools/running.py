@@ -17,6 +17,7 @@ from osimlite.lint.engine import subject_of
 from osimlite.lint.many import settings_of
 from osimlite.lint.setup import Setup
 from osimlite.lint.suffixes import is_table
+from osimlite.multibody.extremes import any_numbers
 from osimlite.schema.registry import MODULES
 from osimlite.text import counted, listed
 from osimlite.tools.job import Job
@@ -39,6 +40,7 @@ class FaultySetup(DocumentError):
 
 
 @collector_paused()
+@any_numbers
 def run(
     setup: str | Path,
     output: str | Path | None = None,

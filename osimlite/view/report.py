@@ -19,7 +19,7 @@ from osimlite.multibody.spatial import Array
 from osimlite.records import replace
 from osimlite.text import listed
 from osimlite.tools.evidence import Evidence, Steps, quietly_steps, root_of, side_of
-from osimlite.tools.outcome import Outcome
+from osimlite.tools.outcome import DYNAMICS, Outcome
 from osimlite.view.lettering import plain_lettering
 from osimlite.view.plots import COLORS, STYLES, figure_of
 from osimlite.view.recording import MeasuredMarkers, Recording
@@ -187,7 +187,7 @@ def _moments(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
 
 
 def _dynamics(outcome: Outcome) -> list[Any]:
-    return [table for table in outcome.tables.values() if table.name == "Inverse Dynamics Generalized Forces"]
+    return [table for table in outcome.tables.values() if table.name == DYNAMICS]
 
 
 def _root(evidence: Evidence | None) -> set[str]:

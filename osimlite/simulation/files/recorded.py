@@ -26,6 +26,8 @@ from osimlite.simulation.lowpass import lowpassed
 from osimlite.simulation.system import System
 from osimlite.text import did_you_mean, listed
 
+LARGEST = 1e25
+"""No coordinate (rad or m) is larger: what follows of such numbers is none."""
 _HALF_ORDER = 3
 """OpenSim differentiates coordinates by splines of fifth degree."""
 
@@ -121,11 +123,12 @@ class RecordedMotion:
                 f"the time {table.times[late[0] + 1]:g} does not come after {table.times[late[0]]:g}; sort the rows",
                 file=str(path),
             )
-        gaps = np.argwhere(~np.isfinite(values))
+        gaps = np.argwhere(~(np.abs(values) < LARGEST))
         if len(gaps):
             row, place = gaps[0]
             name = mechanism.coordinates[place].name
-            told = f"'{name}' is {values[row, place]} at {table.times[row]:g} s; fill the gaps"
+            told = f"'{name}' is {values[row, place]} at {table.times[row]:g} s; "
+            told += "fill the gaps" if not np.isfinite(values[row, place]) else "no body goes so far"
             raise DocumentError(told, file=str(path))
         missing = tuple(info.name for place, info in enumerate(mechanism.coordinates) if place not in found)
         return cls(mechanism, table.times, values, missing, tuple(ignored))
