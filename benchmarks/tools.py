@@ -30,7 +30,11 @@ from rich.table import Table
 import osimlite
 from _corpus import CORPUS
 from _pair import Pair, _run, pair, pair_commands
+from osimlite.fitting.orientation_data import OrientationData
+from osimlite.fitting.sensors import place_sensors
+from osimlite.multibody.spatial import quaternion, rotation_xyz
 from osimlite.simulation.files.recorded import RecordedMotion
+from osimlite.simulation.files.storage import write_sto
 from osimlite.simulation.files.trc import write_trc
 from validate import whole_process
 
@@ -134,6 +138,7 @@ def cases(place: Path) -> Iterator[Case]:
     )
     if (CORPUS / "m0954.osim.gz").exists():
         yield made(place / "rajagopal", 40)
+        yield worn(place / "sensors", 100)
     unpack(place / "id10", "id_gait10/*", "ik_gait10/subject01_walk_IK.mot", f"models/{ten}.gz")
     setup = dynamics(place / "id10", "walk_Setup_ID.xml", ten)
     yield Case("ID gait10", "InverseDynamicsTool", setup, 10, ("time_range", (0.0, 1.25)))
@@ -160,19 +165,58 @@ def dynamics(folder: Path, setup: str, model: str) -> Path:
     )
 
 
-def made(folder: Path, frames: int) -> Case:
-    """Inverse kinematics of a motion of Rajagopal2016, whose knees are constrained."""
-    folder.mkdir()
-    model = folder / "model.osim"
-    model.write_bytes(gzip.decompress((CORPUS / "m0954.osim.gz").read_bytes()))
-    mechanism = osimlite.mechanism(osimlite.read(model))
+def swung(model: osimlite.Model, frames: int) -> RecordedMotion:
+    """A motion in which every joint swings, at 100 Hz, and the constraints hold."""
+    mechanism = osimlite.mechanism(model)
     times = np.linspace(0.0, (frames - 1) / 100.0, frames)
     columns = [
         info.default_value + 0.15 * np.sin(5.0 * times + k) * (info.motion_type == "rotational")
         for k, info in enumerate(mechanism.coordinates)
     ]
-    motion = RecordedMotion(mechanism, times, np.array(columns).T).assembled()
-    markers = motion.markers()
+    return RecordedMotion(mechanism, times, np.array(columns).T).assembled()
+
+
+def worn(folder: Path, frames: int) -> Case:
+    """Inverse kinematics of sensors on all bodies of Rajagopal2016, five degrees off."""
+    folder.mkdir()
+    (folder / "plain.osim").write_bytes(gzip.decompress((CORPUS / "m0954.osim.gz").read_bytes()))
+    model = osimlite.read(folder / "plain.osim")
+    names = [f"{body.name}_imu" for body in model.body_set.objects]
+    place_sensors(model, OrientationData.of({name: np.eye(3) for name in names}))
+    osimlite.write(model, folder / "model.osim")
+    motion, rng = swung(model, frames), np.random.default_rng(1)
+    placed = {path.rpartition("/")[2]: frame for path, frame in motion.mechanism.frames.items()}
+    rows = []
+    for q in motion.values:
+        state = motion.mechanism.at(q)
+        found = np.array([(state.transform(placed[name].body) @ placed[name].transform)[:3, :3] for name in names])
+        off = np.array([rotation_xyz(angles) for angles in rng.normal(0.0, np.deg2rad(5.0), (len(names), 3))])
+        rows.append(quaternion(off @ found).ravel().tolist())
+    write_sto(folder / "trial.sto", "trial", motion.times.tolist(), names, rows, kind="Quaternion")
+    tool = osimlite.IMUInverseKinematicsTool(
+        name="trial",
+        model_file="model.osim",
+        orientations_file="trial.sto",
+        results_directory="results",
+        time_range=(0.0, 9.0),
+    )
+    osimlite.write(tool, folder / "setup.xml")
+    return Case(
+        "IMU IK Rajagopal2016, with constraints",
+        "IMUInverseKinematicsTool",
+        folder / "setup.xml",
+        50,
+        ("time_range", (0.0, 0.005 * frames)),
+    )
+
+
+def made(folder: Path, frames: int) -> Case:
+    """Inverse kinematics of a motion of Rajagopal2016, whose knees are constrained."""
+    folder.mkdir()
+    model = folder / "model.osim"
+    model.write_bytes(gzip.decompress((CORPUS / "m0954.osim.gz").read_bytes()))
+    motion = swung(osimlite.read(model), frames)
+    times, markers = motion.times, motion.markers()
     noisy = markers.rows + np.random.default_rng(1).normal(0.0, NOISE, markers.rows.shape)
     names = [column.removesuffix("_X") for column in markers.columns[::3]]
     write_trc(folder / "trial.trc", times.tolist(), names, noisy.tolist())
