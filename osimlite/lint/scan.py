@@ -58,7 +58,9 @@ class Scan:
             first = frame.start() if frame else len(data)
             start, line = first, line + data.count(b"\n", start, first)
         layout = MARKERS if self.markers else VECTORS if self.parts > 1 else ROWS
-        whole = (b"\t" if self.markers else b"").join([b",".join([b"0"] * self.parts)] * self.cells)
+        # The time is one number, also of vectors.
+        cells = [b"0", *[b",".join([b"0"] * self.parts)] * (self.cells - 1)]
+        whole = (b"\t" if self.markers else b"").join(cells)
         for block in _blocks(data, start):
             lines = block.split(b"\n")
             lines.pop()

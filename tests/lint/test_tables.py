@@ -123,3 +123,21 @@ def test_the_last_row_twice_is_how_opensim_ends_some_results(tmp_path, times, se
     file.write_text(f"states\nversion=1\nnRows=4\nnColumns=2\ninDegrees=no\nendheader\ntime knee\n{rows}")
     (finding,) = run(subject_of(str(file))).findings
     assert (finding.code, str(finding.severity)) == ("OSIM808", severity)
+
+
+def test_rows_of_vectors_are_taken_many_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only rows that are not good are looked at one by one: quaternions and Vec3 are no such."""
+    lines = [f"{0.1 * k:.1f}\t1,-2e-3,{k}\t0.5,0.25,-1\n" for k in range(50)]
+    lines[20] = "2.0\t1,2\t0.5,0.25,-1\n"
+    odd: list[int] = []
+    one_by_one = Scan._odd
+
+    def noted(scan: Scan, text: bytes, line: int) -> None:
+        odd.append(line)
+        one_by_one(scan, text, line)
+
+    monkeypatch.setattr(Scan, "_odd", noted)
+    found = Scan(3, 3).run("".join(lines).encode(), 0, 7)
+    assert odd == [27] and found.count == 50 and list(found.times[:2]) == [0.0, 0.1]
+    assert [(fault.kind, fault.line) for fault in found.faults.values()] == [("cell", 27)]
+    assert found.samples[1] == [0.1, 1.0, -2e-3, 1.0, 0.5, 0.25, -1.0]
