@@ -6,7 +6,7 @@ where it is not.
 
 from __future__ import annotations
 
-from math import isfinite
+import math
 
 import numpy as np
 
@@ -19,13 +19,14 @@ MOST_SAMPLES = 100_000
 """A record is not sampled more finely than this many times."""
 
 
-def lowpassed(times: Array, values: Array, cutoff: float) -> tuple[Array, Array]:
+def lowpassed(times: Array, values: Array, cutoff: float, *, limited: bool = False) -> tuple[Array, Array]:
     """A filtered record, with the continuation at both ends.
 
     Args:
         times: (t,), s, increasing.
         values: (t, n).
         cutoff: frequency (Hz) of which half the power passes each time the filter is run.
+        limited: whether a frequency that is too high for the times gives way to one that is not, as in OpenSim.
 
     Returns:
         Times (s,), evenly spaced, and values (s, n).
@@ -33,7 +34,7 @@ def lowpassed(times: Array, values: Array, cutoff: float) -> tuple[Array, Array]
     Raises:
         SettingError: the frequency is not positive, or too high for the times, or there is but one.
     """
-    if not (isfinite(cutoff) and cutoff > 0.0):
+    if not (math.isfinite(cutoff) and cutoff > 0.0):
         raise SettingError(f"a low-pass frequency is a positive number of Hz, not {cutoff:g}")
     if len(times) < 2:
         raise SettingError("a low-pass filter needs a motion of two rows or more")
@@ -48,6 +49,8 @@ def lowpassed(times: Array, values: Array, cutoff: float) -> tuple[Array, Array]
         even = even[even <= times[-1]]
         (values,) = derivatives_of_samples(times, values, even, (0,))
         times = even
+    if limited and cutoff * step >= 0.5:
+        cutoff = 0.49 / step
     if cutoff * step >= 0.5:
         raise SettingError(
             f"a low-pass frequency of {cutoff:g} Hz is too high for samples every {step:g} s; "
@@ -64,9 +67,15 @@ def _continued(values: Array, count: int) -> Array:
 
 def _filtered(values: Array, cutoff: float) -> Array:
     """Values (t, n) after one run; `cutoff` in parts of the sampling frequency. The first three stay as they are."""
-    signal = require("scipy.signal", extra="sim", purpose="a low-pass filter")
-    # Before scipy 1.17 they are complex numbers for cutoffs near zero.
-    coefficients = np.real(signal.butter(3, 2.0 * cutoff))
-    before = [signal.lfiltic(*coefficients, column, column) for column in values[2::-1].T]
-    rest, _ = signal.lfilter(*coefficients, values[3:], axis=0, zi=np.transpose(before))
-    return np.concatenate([values[:3], rest])
+    lapack = require("scipy.linalg.lapack", extra="sim", purpose="a low-pass filter")
+    w = math.tan(math.pi * cutoff)
+    scale = (w + 1.0) * (w * w + w + 1.0)
+    sums = [3 * w**3 + 2 * w * w - 2 * w - 3, 3 * w**3 - 2 * w * w - 2 * w + 3, (w - 1.0) * (w * w - w + 1.0)]
+    # Each value follows from those before: equations with as many diagonals, solved from the first on.
+    bands = np.ones((4, len(values)))
+    for back, total in enumerate(sums, 1):
+        bands[back] = total / scale
+        bands[back, : 3 - back] = 0.0
+    taken = values[3:] + 3.0 * (values[2:-1] + values[1:-2]) + values[:-3]
+    found, _ = lapack.dtbtrs(bands, np.concatenate([values[:3], w**3 / scale * taken]), uplo="L", diag="U")
+    return np.asarray(found, dtype=np.float64)

@@ -126,7 +126,7 @@ def test_analyses(
     compare(*both(tmp_path, model, "AnalyzeTool", more, cutoff), 1e-8, 1e-8)
 
 
-@pytest.mark.parametrize("cutoff", [-1.0, 6.0])
+@pytest.mark.parametrize("cutoff", [-1.0, 6.0, 30.0])
 def test_inverse_dynamics(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cutoff: float) -> None:
     monkeypatch.chdir(tmp_path)
     model = osimlite.read(real(corpus, "m0001"))

@@ -151,13 +151,14 @@ class RecordedMotion:
 
         Args:
             cutoff: frequency, Hz.
-            continued: whether what the filter adds at both ends, half the length of the motion each, is part of it.
+            continued: whether what the filter adds at both ends, half the length of the motion each, is part of it, and
+                a frequency that is too high gives way, as in OpenSim's tools.
 
         Raises:
             SettingError: the frequency is not positive, or too high for the times, or there are fewer than six.
         """
         self._require_times("a filter needs")
-        times, values = lowpassed(self.times, self.values, cutoff)
+        times, values = lowpassed(self.times, self.values, cutoff, limited=continued)
         if continued:
             return replace(self, times=times, values=values, around=None)
         # What the filter adds at the ends nobody has recorded.
