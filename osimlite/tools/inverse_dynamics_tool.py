@@ -45,7 +45,9 @@ def run(job: Job, outcome: Outcome) -> None:
     outcome.evidence = Evidence.of(
         model, job.needed("model_file"), recorded.mechanism, recorded.times, recorded.values, loads=loads
     )
-    outcome.tell("largest", f"{np.abs(table.rows).max():.6g}")
+    row, column = np.unravel_index(int(np.abs(table.rows).argmax()), table.rows.shape)
+    most = f"{table.columns[column]}, {table.rows[row, column]:.6g} at {table.times[row]:g} s"
+    outcome.tell("largest", most)
     _tell_residuals(outcome, recorded.mechanism, table)
 
 

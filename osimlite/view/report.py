@@ -28,6 +28,8 @@ from osimlite.view.shown import Shown
 SIDES = {"r": (COLORS[0], "right"), "l": (COLORS[1], "left"), "": ("#444444", "")}
 """Colour and name of the lines of each side."""
 PERCENT = np.linspace(0.0, 100.0, 101)
+STILL = 1e-4
+"""An angle that changes by less (rad) does not move."""
 WORST = 12
 """So many markers are shown by name."""
 STYLE = """
@@ -159,7 +161,7 @@ def _angles(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
         assert evidence is not None
         for place, name in enumerate(evidence.coordinates):
             column = evidence.values[:, place]
-            if not evidence.turning[place] or np.ptp(column) < 1e-9:
+            if not evidence.turning[place] or np.ptp(column) < STILL:
                 continue
             stem, side = side_of(name)
             panels.setdefault(f"{stem} (deg)", []).append(
