@@ -18,12 +18,20 @@ TAG = st.sampled_from(["a", "ab", "a.b", "a-c"])
 ATTRIBUTES = st.sampled_from(["", " x='>'", ' x="/>"', "\n x = '1'", ' x="a" y="/"'])
 TEXT = st.sampled_from(
     ["", " ", "1 2", "a > b", "<!-- remark -->", "<!-- </a> -->", "<![CDATA[</ab>]]>", "<?pi </a>?>", "<!-- <a> -->"]
+    + [
+        "![",
+        "!? [",
+        "<!-- ? [ ! -->",
+        "<!-- <![CDATA[ ]]> </a> -->",
+        "<![CDATA[<!-- --> </a>]]>",
+        "<?pi <!-- --> </a>?>",
+    ]
 )
 TREE: st.SearchStrategy[str] = st.recursive(
     st.one_of(st.builds("<{}{}/>".format, TAG, ATTRIBUTES), TEXT),
     lambda inner: st.builds(
-        lambda tag, attributes, content: f"<{tag}{attributes}>{''.join(content)}</{tag} >",
-        TAG, ATTRIBUTES, st.lists(inner, max_size=4),
+        lambda tag, attributes, content, end: f"<{tag}{attributes}>{''.join(content)}</{tag}{end}>",
+        TAG, ATTRIBUTES, st.lists(inner, max_size=4), st.sampled_from(["", " "]),
     ),
     max_leaves=20,
 )  # fmt: skip
