@@ -209,8 +209,9 @@ class PlainSpans(Sequence[Span]):
         close = self.text.find("<", place)
         if self.text[close + 1] == "/":
             return close
-        first = self.text.find(f"</{tag}>", close)
-        if first >= 0 and self.text.find(f"<{tag}", close, first) < 0 and self._is_in_sight(first, close):
+        first = self.text.index(f"</{tag}", close)
+        is_its = self.text[first + len(tag) + 2] in "> \t\r\n"
+        if is_its and self.text.find(f"<{tag}", close, first) < 0 and self._is_in_sight(first, close):
             # As good as always: what stands before it neither nests nor hides one.
             return first
         depth = 1

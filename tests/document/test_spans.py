@@ -16,17 +16,9 @@ PIECES = ["<a>", "</a>", "<a b='>'>", "<a/>", '<b c=">"/>', "<b>", "</b >", "<!-
 PIECES += ["<![CDATA[<a>]]>", "<?x <a>?>", '"', "'", "text", " ", "\n", "<a\tb='1'\n>", "<:: >", "<a&b>"]
 TAG = st.sampled_from(["a", "ab", "a.b", "a-c"])
 ATTRIBUTES = st.sampled_from(["", " x='>'", ' x="/>"', "\n x = '1'", ' x="a" y="/"'])
-TEXT = st.sampled_from(
-    ["", " ", "1 2", "a > b", "<!-- remark -->", "<!-- </a> -->", "<![CDATA[</ab>]]>", "<?pi </a>?>", "<!-- <a> -->"]
-    + [
-        "![",
-        "!? [",
-        "<!-- ? [ ! -->",
-        "<!-- <![CDATA[ ]]> </a> -->",
-        "<![CDATA[<!-- --> </a>]]>",
-        "<?pi <!-- --> </a>?>",
-    ]
-)
+HIDING = ["<!-- remark -->", "<!-- </a> -->", "<![CDATA[</ab>]]>", "<?pi </a>?>", "<!-- <a> -->", "<!-- ? [ ! -->"]
+HIDING += ["<!-- <![CDATA[ ]]> </a> -->", "<![CDATA[<!-- --> </a>]]>", "<?pi <!-- --> </a>?>"]
+TEXT = st.sampled_from(["", " ", "1 2", "a > b", "![", "!? [", *HIDING])
 TREE: st.SearchStrategy[str] = st.recursive(
     st.one_of(st.builds("<{}{}/>".format, TAG, ATTRIBUTES), TEXT),
     lambda inner: st.builds(
@@ -82,6 +74,14 @@ def test_what_looks_like_an_element_in_a_comment_or_its_like_is_none(text: str) 
     assert isinstance(source.spans, PlainSpans)
     assert list(source.spans) == one_by_one(text)
     assert [span.tag for span in source.spans if span.tag in "bd"] == []
+
+
+@pytest.mark.parametrize("text", ["<a><a><b/></a ></a>", "<a><b/><a><b/></a\n></a>", "<a><b/><ab></ab></a >"])
+def test_an_end_may_have_a_blank(text: str) -> None:
+    source = Source(text.encode())
+    parse(source)
+    assert isinstance(source.spans, PlainSpans)
+    assert list(source.spans) == one_by_one(text)
 
 
 def test_the_walker_is_read_in_parts(fixtures: Path) -> None:
