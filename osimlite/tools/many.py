@@ -18,7 +18,6 @@ from osimlite.lint.config import Config
 from osimlite.lint.engine import subject_of
 from osimlite.lint.setup import Setup
 from osimlite.records import dataclass, field
-from osimlite.sweep.pools import WorkerLostError, processes
 from osimlite.text import counted, listed
 from osimlite.tools.running import run
 
@@ -282,6 +281,8 @@ class _Work:
 
     def share(self, do: Callable[[Path], Trial], workers: int | None, cluster: str | None) -> None:
         """Run setups side by side. Those that were under way when a process ended are run again, each alone."""
+        from osimlite.sweep.pools import WorkerLostError, processes
+
         alone: list[Path] = []
         while len(self.trials) < len(self.setups):
             under_way: list[Path] = []
@@ -303,6 +304,8 @@ class _Work:
             alone = []
 
     def _alone(self, do: Callable[[Path], Trial], setup: Path) -> None:
+        from osimlite.sweep.pools import WorkerLostError, processes
+
         try:
             with processes(do, workers=1) as pool:
                 pool.submit(setup, setup)
