@@ -6,8 +6,7 @@ import time
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from math import floor, isfinite
-from numbers import Real
+from math import isfinite
 from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any
@@ -30,6 +29,8 @@ from osimlite.simulation.integrators import DEFAULT_ACCURACY, LOOSE, MERSON, che
 from osimlite.simulation.options import PER_RUN, Options
 from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.simulation.recorder import Recorder
+from osimlite.simulation.run_times import check_step
+from osimlite.simulation.run_times import report_times as report_times
 from osimlite.simulation.start import in_units_of, starting, state_in, suspect_value
 from osimlite.simulation.states import in_model_order
 from osimlite.simulation.stepper import Observer, Progress, Stepper
@@ -200,7 +201,7 @@ class Simulation:
         fixed_step, initial = chosen.fixed_step, chosen.initial
         times = report_times(to, chosen.report_interval)
         if fixed_step is not None:
-            _check_step(fixed_step, to)
+            check_step(fixed_step, to)
             for name in ("accuracy", "integrator"):
                 if getattr(chosen, name) is not None:
                     raise SettingError(f"the {name} means nothing for a fixed step; leave one of them out")
@@ -440,49 +441,3 @@ def _require_finite_start(mechanism: Mechanism) -> None:
             if not isfinite(number):
                 raise SimulationError(f"the default {what} of coordinate '{info.path}' is {number}; give a number")
     require_numbers(mechanism, mechanism.mass_matrix({}))
-
-
-MOST_STEPS = 1_000_000_000
-"""Of a fixed length, which take hours to days."""
-
-LONGEST_STEP = 0.1
-"""A longer fixed step (s) follows no motion of bodies: a thousandth is usual, and MuJoCo takes 0.002 by itself."""
-
-
-def _is_number(value: object) -> bool:
-    """Whether it is a number: not every caller checks types."""
-    return isinstance(value, Real)
-
-
-def _check_step(h: float, to: float) -> None:
-    if not (_is_number(h) and isfinite(h) and h > 0.0):
-        raise SettingError(f"the fixed step is a positive and finite number of seconds, not {h!r}")
-    if h > LONGEST_STEP:
-        raise SettingError(
-            f"a fixed step of {h:g} s is too long for any motion of bodies; take at most {LONGEST_STEP:g} s, with "
-            "contacts about 0.001 s"
-        )
-    if h * MOST_STEPS < to:
-        raise SettingError(f"{to:g} s in fixed steps of {h:g} s are more than a thousand million; take longer steps")
-
-
-def report_times(to: float, interval: float) -> list[float]:
-    """0, interval, 2 interval ... and `to` (s).
-
-    Raises:
-        SimulationError: a number has no meaning.
-    """
-    for number in (to, interval):
-        if not _is_number(number):
-            raise SettingError(f"a time is a number of seconds, not {number!r}")
-    if not (isfinite(to) and to > 0.0):
-        raise SettingError(f"a simulation goes on for a positive time, not {to:g} s")
-    if not (isfinite(interval) and interval > 0.0):
-        raise SettingError(f"the report interval is a positive time, not {interval:g} s")
-    if to / interval > 1e7:
-        raise SettingError(f"a report every {interval:g} s makes more than ten million rows; take a longer interval")
-    times = [number * interval for number in range(floor(to / interval) + 1)]
-    # A last moment that differs from `to` only by rounding is `to`.
-    if to - times[-1] <= 1e-9 * interval:
-        times.pop()
-    return [*times, to]

@@ -10,7 +10,7 @@ import numpy as np
 
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.records import dataclass, replace
-from osimlite.simulation.run import report_times
+from osimlite.simulation.run_times import report_times
 from osimlite.simulation.runs import Runs, Watch
 from osimlite.sweep.measures import Batch, Measure, State, measure, measure_name
 from osimlite.sweep.plan import MOST_TRIES, Plan
