@@ -86,7 +86,7 @@ datarows {len(times)}
 otherdata 1
 range {times[0]:f} {times[-1]:f}"""
     add("states_degrees.mot", StoTable(name, times, paths, rows * turning, in_degrees=True), simm)
-    controls = simulation.forces.controls.names
-    if controls:
-        labels = tuple(path.rpartition("/")[2] for path in controls)
-        add("controls.sto", StoTable("controls", times, labels, motion.looked(motion.system.places_of_controls)))
+    labels = tuple(path.rpartition("/")[2] for path in simulation.forces.controls.names)
+    # Of a model without actuators OpenSim writes a table without rows.
+    found = motion.looked(motion.system.places_of_controls) if labels else np.empty((0, 0))
+    add("controls.sto", StoTable("controls", times[: len(found)], labels, found))

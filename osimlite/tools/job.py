@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from osimlite.document.part import read_object
-from osimlite.document.reader import read
+from osimlite.document.reader import read, read_document
+from osimlite.document.source import Source
 from osimlite.errors import DocumentError
 from osimlite.records import dataclass
 from osimlite.schema.model import Model
@@ -69,8 +69,12 @@ class Job:
         return read(self.needed("model_file"))
 
     def read(self, path: Path, cls: type) -> Any:
-        """An object of a class that another document holds."""
-        return read_object(path, cls)
+        """An object of a class that another document holds; what it says that means nothing is ignored, as in OpenSim.
+
+        Raises:
+            DocumentError: the file is missing or holds something else.
+        """
+        return read_document(Source.of_file(path), of=cls).top
 
     def result(self, name: str) -> Path:
         """Where a file of results goes that the setup names by itself: its `results_directory` does not count."""

@@ -12,7 +12,9 @@ import numpy as np
 
 from osimlite._load import module_name
 from osimlite.records import replace
+from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Object
+from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.forces import ForceSet
 from osimlite.schema.model import Model
 from osimlite.schema.specs import file_specs
@@ -87,7 +89,13 @@ def told_model(job: Job) -> Model:
             for force in list(job.read(path, ForceSet).objects):
                 model.force_set.objects.append(force)
     for controller in setup.controller_set.objects:
-        model.controller_set.objects.append(_from_here(job, controller.copy_deep()))
+        own = _from_here(job, controller.copy_deep())
+        actuators = list(model.components(Actuator))
+        # Older setups name all actuators by one word, which they cannot spell out without the model.
+        functions = own.ControlFunctions.objects if isinstance(own, PrescribedController) else []
+        if functions and not own.socket_actuators and len(functions) == len(actuators):
+            own.socket_actuators = tuple(actuators)
+        model.controller_set.objects.append(own)
     return model
 
 
@@ -95,7 +103,7 @@ def _from_here(job: Job, item: Object) -> Any:
     """An object of the setup whose files are looked for from the folder of the setup, wherever the model is."""
     for part in item.walk():
         for spec in file_specs(type(part), "file"):
-            path = job.place(str(getattr(part, spec.name)))
+            path = job.place(str(getattr(part, spec.name) or ""))
             if path is not None:
                 setattr(part, spec.name, str(path.absolute()))
     return item

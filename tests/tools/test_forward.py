@@ -57,6 +57,9 @@ def test_a_motion_goes_on_from_the_row_before(setup: Path) -> None:
     degrees = outcome.tables["fall_states_degrees.mot"]
     turning = [name for name in states.columns if "knee" in name.lower()]
     assert turning and all(np.allclose(np.radians(degrees[name]), states[name], rtol=1e-14) for name in turning)
+    # A model without actuators has a table of controls without rows, as OpenSim writes it.
+    (empty,) = [path for path in outcome.files if path.name == "fall_controls.sto"]
+    assert empty.read_text() == "controls\nversion=1\nnRows=0\nnColumns=1\ninDegrees=no\nendheader\ntime\n"
     every, some = (outcome.tables[f"fall_{name}_q.sto"] for name in ("all", "some"))
     assert every.times.tolist() == states.times.tolist()
     numbers = sorted({*range(0, len(every.times), 3), len(every.times) - 1})
@@ -98,6 +101,26 @@ def test_what_means_nothing_is_refused_and_nothing_is_written(setup: Path, old: 
     with pytest.raises(OsimliteError, match=said):
         osimlite.run(setup, check=False)
     assert not (setup.parent / "results").exists()
+
+
+def test_what_a_setup_adds_may_be_old(setup: Path, tmp_path: Path) -> None:
+    """Forces with words that mean nothing any more, and a controller that names all actuators by one word."""
+    (tmp_path / "forces.xml").write_text(
+        '<OpenSimDocument Version="20302"><ForceSet name="f"><objects><CoordinateActuator name="push">'
+        "<coordinate>RKnee_rz</coordinate><optimal_force>2</optimal_force><max_force>3</max_force></CoordinateActuator>"
+        "</objects></ForceSet></OpenSimDocument>"
+    )
+    controllers = (
+        "<ControllerSet><objects><PrescribedController name='c'><actuator_list> all </actuator_list>"
+        "<FunctionSet name='ControlFunctions'><objects><Constant><value>0.5</value></Constant></objects></FunctionSet>"
+        "</PrescribedController></objects></ControllerSet>"
+    )
+    text = SETUP.replace("40600", "20302").replace("<states_file>", f"{controllers}<states_file>")
+    setup.write_text(
+        text.replace("<output_precision>", "<force_set_files>forces.xml</force_set_files><output_precision>")
+    )
+    table = osimlite.run(setup, check=False).tables["fall_controls.sto"]
+    assert table.columns == ("push",) and len(table.times) > 1 and (table.rows == 0.5).all()
 
 
 def test_labels_of_all_ages_are_states() -> None:
