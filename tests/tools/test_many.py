@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -186,6 +185,8 @@ def test_what_is_there_is_whole_and_resuming_ends_with_the_same_bytes(trials: Pa
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
 def test_a_full_disk_is_told_and_leaves_no_part(trials: Path) -> None:
+    import resource
+
     limit = 3000
 
     def full() -> None:
