@@ -50,9 +50,12 @@ def run(
     Example: osimlite run scale.xml 'trials/*/ik.xml' 'trials/*/id.xml' --workers 4
     """
     from osimlite.cli._progress import progress_bar
+    from osimlite.errors import SettingError
     from osimlite.tools.many import found, run_many
 
     files = found(setups)
+    if report is not None and (as_json or resume or cluster or workers):
+        raise SettingError("--report runs setups one after the other; leave out the other options of how they run")
     if report is not None or (len(files) == 1 and not as_json and not (resume or cluster)):
         raise SystemExit(_run_each(files, output, report))
     count = 1 if workers is None and cluster is None and len(files) < WORTH_SHARING else workers
@@ -78,16 +81,17 @@ def _codes(trials: list[Trial]) -> list[int]:
 
 
 def _run_each(setups: list[Path], output: Path | None, report: Path | None) -> int:
-    """Run setups in the order that is given, and say of each what came out; the first that fails is the last."""
+    """Run setups one after the other, and say of each what came out; the first that fails is the last."""
     from osimlite.lint.diagnostic import Report
-    from osimlite.tools.many import places_of
+    from osimlite.tools.many import in_order, places_of
     from osimlite.tools.running import FaultySetup
     from osimlite.tools.running import run as run_setup
 
     outcomes: dict[str | Path, Outcome] = {}
-    for setup, place in places_of(setups, output).items():
+    places = places_of(setups, output)
+    for setup in in_order(setups):
         try:
-            outcomes[setup] = run_setup(setup, place, tell=_show_findings)
+            outcomes[setup] = run_setup(setup, places[setup], tell=_show_findings)
         except FaultySetup as fault:
             _show_findings(Report(fault.report.errors, fault.report.texts))
             raise

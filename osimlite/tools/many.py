@@ -314,6 +314,14 @@ class _Work:
             self.note(Trial(str(setup), FAILED, message="the process that ran it has ended, twice"))
 
 
+def in_order(setups: Sequence[Path]) -> list[Path]:
+    """Setups so that each comes after those that make what it names."""
+    needs, found = _needs(setups), list[Path]()
+    while len(found) < len(setups):
+        found += [setup for setup in setups if setup not in found and set(needs[setup]) <= set(found)]
+    return found
+
+
 def _needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
     """Which other setups make what a setup names, by the names of files in them; never two each other's."""
     makers: dict[str, Path] = {}

@@ -83,7 +83,9 @@ def data_of(page: str) -> list[dict[str, Any]]:
 
 
 def test_a_page_for_two_trials_needs_nothing_else(trials: Path) -> None:
-    words = [f"trial{k}/{name}.xml" for k in range(2) for name in ("z_ik", "id")]
+    words = [f"trial{k}/{name}.xml" for k in range(2) for name in ("id", "z_ik")]
+    done = run("run", *words, "--report", "report.html", "--resume", folder=trials)
+    assert done.code == 2 and "one after the other" in done.err
     done = run("run", *words, "--report", "report.html", folder=trials)
     assert done.code == 0 and "wrote report.html" in done.out
     page = (trials / "report.html").read_text()
