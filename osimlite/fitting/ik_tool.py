@@ -125,7 +125,8 @@ def told(motion: FittedMotion) -> Iterator[str]:
         rms, largest = found["rms_marker_error"], found["largest_marker_error"]
         advised = "" if rms < ADVICE[0] and largest < ADVICE[1] else "; OpenSim advises less than 2 and 4 cm"
         yield (
-            f"{found['frames']} frames, {found['markers']} markers: errors of {100.0 * rms:.2f} cm (root mean square), "
+            f"{counted(found['frames'], 'frame')}, {counted(found['markers'], 'marker')}: "
+            f"errors of {100.0 * rms:.2f} cm (root mean square), "
             f"at most {100.0 * largest:.2f} cm ({found['worst_marker']} at {found['worst_time']:g} s){advised}"
         )
     if "rms_orientation_error" in found:

@@ -114,8 +114,8 @@ class Recording:
         names = [name for name in self.names if name in model and (chosen is None or name in chosen)]
         if not names:
             raise OsimliteError(
-                f"no {self.noun} of {self.source} ({listed([*self.names])}) is one of the model ({listed([*model])}); "
-                f"give what it is in the model the name that it has in the data"
+                f"no {self.noun} of {self.source} ({listed([*self.names])}) is one of the model "
+                f"({listed([*model]) or 'none'}); give what it is in the model the name that it has in the data"
             )
         return names
 

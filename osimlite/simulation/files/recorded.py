@@ -24,7 +24,7 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.simulation.lowpass import lowpassed
 from osimlite.simulation.system import System
-from osimlite.text import did_you_mean, listed
+from osimlite.text import counted, did_you_mean, listed
 
 LARGEST = 1e25
 """No coordinate (rad or m) is larger: what follows of such numbers is none."""
@@ -181,7 +181,7 @@ class RecordedMotion:
     def _require_times(self, what: str) -> None:
         count = len(self.around[0] if self.around else self.times)
         if count < 2 * _HALF_ORDER:
-            raise SettingError(f"the motion has {count} times; {what} at least {2 * _HALF_ORDER}")
+            raise SettingError(f"the motion has {counted(count, 'time')}; {what} at least {2 * _HALF_ORDER}")
 
     def assembled(self) -> RecordedMotion:
         """The motion with every pose changed as little as the constraints demand.
