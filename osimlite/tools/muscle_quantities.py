@@ -17,7 +17,6 @@ from osimlite.schema.muscles import (
     Thelen2003Muscle,
 )
 from osimlite.schema.old_muscles import (
-    Delp1990Muscle_Deprecated,
     Schutte1993Muscle_Deprecated,
     Thelen2003Muscle_Deprecated,
 )
@@ -116,6 +115,5 @@ CHECKED: dict[type[Muscle], Callable[[Tables, Sequence[Any]], Tables]] = {
     RigidTendonMuscle: _rigid,
     Thelen2003Muscle_Deprecated: _old,
     Schutte1993Muscle_Deprecated: _old,
-    Delp1990Muscle_Deprecated: _old,
 }
 """The classes whose results were held to OpenSim's, and what is otherwise in each."""
