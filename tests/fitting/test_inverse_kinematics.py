@@ -15,6 +15,7 @@ from osimlite.errors import DocumentError, MissingDependency, OsimliteError, Set
 from osimlite.fitting.marker_data import MarkerData, read_trc
 from osimlite.simulation.files.trc import write_trc
 
+TRIALS = Path(__file__).parents[2] / "fixtures" / "trials"
 MARKERS = ("one", "two", "three", "four")
 POINTS = np.array(((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.3), (0.1, 0.1, 0.1)))
 
@@ -211,18 +212,13 @@ def test_c3d_files_need_a_package_of_their_own(tmp_path: Path, monkeypatch: pyte
         osimlite.inverse_kinematics(free_body(), tmp_path / "walk.c3d")
 
 
-def test_c3d_files_are_read(tmp_path: Path) -> None:
+def test_c3d_files_are_read() -> None:
     """In their unit, with their rate; what was not seen is NaN."""
-    ezc3d = pytest.importorskip("ezc3d")
-    places = positions(motion(5))
-    file = ezc3d.c3d()
-    file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
-    file["parameters"]["POINT"]["RATE"]["value"] = [100]
-    file["parameters"]["POINT"]["LABELS"]["value"] = list(MARKERS)
-    points = np.ones((4, 4, 5))
-    points[:3] = 1000.0 * np.moveaxis(places, (0, 1, 2), (2, 1, 0))
-    file["data"]["points"] = points
-    file.write(str(tmp_path / "walk.c3d"))
-    data = MarkerData.of(tmp_path / "walk.c3d")
-    assert data.names == MARKERS and np.diff(data.times) == pytest.approx(0.01)
-    assert data.positions == pytest.approx(places, abs=1e-6)
+    pytest.importorskip("ezc3d")
+    data = MarkerData.of(TRIALS / "two_markers.c3d")
+    frames = np.arange(5.0)
+    one = np.stack((0.1 * frames, 0.2 - 0.01 * frames, -0.3 + 0.001 * frames), axis=1)
+    two = np.stack((-0.1 * frames, 0.5 + 0.01 * frames, 0.002 * frames), axis=1)
+    two[3] = np.nan
+    assert data.names == ("one", "two") and np.diff(data.times) == pytest.approx(0.01)
+    assert data.positions == pytest.approx(np.stack((one, two), axis=1), abs=1e-6, nan_ok=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,10 @@ from osimlite.simulation.elements.external_loads import read_external_loads
 from osimlite.simulation.files.c3d import read_c3d_forces
 from osimlite.simulation.files.storage import write_sto
 
-ezc3d = pytest.importorskip("ezc3d", reason="needs ezc3d (extra 'c3d')")
+pytest.importorskip("ezc3d", reason="needs ezc3d (extra 'c3d')")
 
+TRIALS = Path(__file__).parents[2] / "fixtures" / "trials"
+"""Trials of one marker over 5 frames at 100 Hz; plates measured at 1 kHz."""
 LOADS = """<OpenSimDocument Version="40600">
     <ExternalLoads name="loads">
         <objects>
@@ -35,31 +38,16 @@ LOADS = """<OpenSimDocument Version="40600">
 """
 
 
-def measured(folder: Path, plates: int = 1) -> Any:
-    """A trial of 5 frames, 100 Hz, with plates that measured at 1 kHz; what each channel was (6, 50)."""
-    file, steps = ezc3d.c3d(), np.arange(50)
-    file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
-    file["parameters"]["POINT"]["RATE"]["value"] = [100.0]
-    file["parameters"]["POINT"]["LABELS"]["value"] = ["one"]
-    file["data"]["points"] = np.ones((4, 1, 5))
-    analog, plate = file["parameters"]["ANALOG"], file["parameters"]["FORCE_PLATFORM"]
-    channels = np.array([10.0 + steps, 20.0 - steps, -700.0 - steps, 1e3 + steps, 2e3 - steps, 3e3 + 2 * steps])
-    analog["RATE"]["value"], analog["LABELS"]["value"] = [1000.0], ["Fx", "Fy", "Fz", "Mx", "My", "Mz"]
-    analog["UNITS"]["value"] = ["N", "N", "N", "Nmm", "Nmm", "Nmm"]
-    file["data"]["analogs"] = channels[None]
-    corners = np.array(((500.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 400.0, 0.0), (500.0, 400.0, 0.0))).T
-    plate["USED"]["value"], plate["TYPE"]["value"] = np.array([plates]), np.full(plates, 2)
-    if plates:
-        plate["CORNERS"]["value"], plate["ORIGIN"]["value"] = corners[:, :, None], np.array([[0.0], [0.0], [-40.0]])
-        plate["CHANNEL"]["value"] = np.arange(1, 7)[:, None]
-    file.write(str(folder / "trial.c3d"))
-    return channels
+def measured() -> Any:
+    """What each channel of the plate of `force_plate.c3d` measured (6, 50), N and N·mm."""
+    steps = np.arange(50)
+    return np.array([10.0 + steps, 20.0 - steps, -700.0 - steps, 1e3 + steps, 2e3 - steps, 3e3 + 2 * steps])
 
 
-def test_forces_are_those_of_the_plate(tmp_path: Path) -> None:
+def test_forces_are_those_of_the_plate() -> None:
     """The plate looks downwards, its origin is 4 cm below its surface: moments are those about its middle."""
-    x, y, z, mx, my, mz = measured(tmp_path)
-    table = read_c3d_forces(tmp_path / "trial.c3d")
+    x, y, z, mx, my, mz = measured()
+    table = read_c3d_forces(TRIALS / "force_plate.c3d")
     assert table.columns == tuple(f"{letter}1_{axis}" for letter in "fpm" for axis in "xyz")
     assert np.diff(table.times) == pytest.approx(0.001) and len(table.times) == 50
     assert table.rows[:, :3] == pytest.approx(np.stack((x, -y, -z), axis=1), rel=1e-6)
@@ -69,7 +57,7 @@ def test_forces_are_those_of_the_plate(tmp_path: Path) -> None:
 
 
 def test_loads_of_a_c3d_file_are_those_of_a_table(tmp_path: Path) -> None:
-    measured(tmp_path)
+    shutil.copy(TRIALS / "force_plate.c3d", tmp_path / "trial.c3d")
     table = read_c3d_forces(tmp_path / "trial.c3d")
     write_sto(tmp_path / "trial.sto", "forces", table.times.tolist(), table.columns, table.rows.tolist())
     mechanism, found = osimlite.mechanism(dynamic_walker()), []
@@ -82,9 +70,8 @@ def test_loads_of_a_c3d_file_are_those_of_a_table(tmp_path: Path) -> None:
 
 
 def test_what_has_no_forces_is_told(tmp_path: Path) -> None:
-    measured(tmp_path, plates=0)
     with pytest.raises(DocumentError, match="has no force plates"):
-        read_c3d_forces(tmp_path / "trial.c3d")
+        read_c3d_forces(TRIALS / "no_plate.c3d")
     with pytest.raises(MissingFileError):
         read_c3d_forces(tmp_path / "none.c3d")
     (tmp_path / "torn.c3d").write_bytes(b"no file of motion capture")
