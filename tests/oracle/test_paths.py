@@ -200,6 +200,26 @@ def test_two_points_at_one_place_beside_a_torus(quadrant, tmp_path):
     compare_paths(tmp_path / "model.osim", poses=1)
 
 
+@pytest.mark.parametrize("quadrant", ["all", "-x", "y", "-y"])
+@pytest.mark.parametrize("heights", [(0.11, 0.0), (0.02, 0.0), (0.02, 1e-16), (0.02, 1e-15), (0.0, 0.02), (0.0, 0.0)])
+def test_an_end_beside_the_middle_of_a_cylinder(quadrant, heights, tmp_path):
+    """OpenSim takes the foot of the second end on the axis for a direction: there it is none."""
+    model = Model(name="level")
+    first, second = heights
+    cylinder = WrapCylinder(name="cylinder", quadrant=quadrant, radius=0.03, length=0.2)
+    for number, (x, y) in enumerate([(-0.09, 0.04), (-0.09, -0.01), (0.1, 0.025), (0.05, -0.04)]):
+        spring = PathSpring(name=f"spring{number}", resting_length=0.2, stiffness=300.0, dissipation=0.4)
+        for name, place in (("p0", (x, y, first)), ("p1", (0.1, 0.012, second))):
+            point = at(GROUND, *place)
+            point.name = name
+            spring.geometry_path.path_point_set.objects.append(point)
+        spring.geometry_path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="cylinder"))
+        model.add(spring)
+    model.ground.wrap_object_set.objects.append(cylinder)
+    osimlite.write(model, tmp_path / "model.osim")
+    compare_paths(tmp_path / "model.osim", poses=1)
+
+
 @settings(max_examples=40)
 @given(wrapped())
 def test_around_surfaces(tmp_path_factory, model):

@@ -83,9 +83,13 @@ def around_cylinder(
 
     apex = apex_between(first, second, radius, far)
     normal = unit(cross(minus(first, apex), minus(second, apex)))
-    # OpenSim hands over the foot of the second end where a direction is meant, which it is none if that is the origin.
-    z1 = tangent_height(one, pz, qz, first, normal) if abs(qz) >= EPSILON else pz
-    z2 = tangent_height(two, qz, pz, first, normal)
+    z1, z2 = edge_height(one, pz, first, normal), edge_height(two, qz, first, normal)
+    if abs(qz) < EPSILON:
+        # OpenSim takes the foot of the second end for a direction, which it is none if that is the origin: then all
+        # heights count as that of the first end.
+        z1, z2 = pz, z2 if pz != qz else qz
+    else:
+        z1, z2 = z1 if abs(z1 - qz) < abs(pz - qz) else pz, z2 if abs(z2 - pz) < abs(qz - pz) else qz
     if abs(z1) > 0.5 * length and abs(z2) > 0.5 * length:
         return NONE
     x1, y1, _ = one
@@ -150,13 +154,12 @@ def apex_between(first: Vector, second: Vector, radius: float, far: bool) -> Vec
     return radius * ux, radius * uy, z
 
 
-def tangent_height(point: Vector, own: float, other: float, end: Vector, normal: Vector) -> float:
-    """Height of a tangent point: where its edge meets a plane, if that is nearer to the other end than its own end is.
+def edge_height(point: Vector, own: float, end: Vector, normal: Vector) -> float:
+    """Height at which the edge of a tangent point meets a plane, or its own if that is nowhere near.
 
     Args:
         point: of the edge, which is parallel to the axis.
         own: height of the end that the point belongs to, m.
-        other: height of the other end, m.
         end: a point of the plane.
         normal: to the plane, the zero vector if there is no plane.
     """
@@ -166,7 +169,7 @@ def tangent_height(point: Vector, own: float, other: float, end: Vector, normal:
     dx, dy, _ = minus(end, point)
     _, _, height = end
     z = height + (dx * nx + dy * ny) / nz
-    return z if abs(z - own) <= FARTHEST and abs(z - other) < abs(own - other) else own
+    return z if abs(z - own) <= FARTHEST else own
 
 
 def helix(arc: float, rise: float) -> float:
