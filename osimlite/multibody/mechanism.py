@@ -219,10 +219,10 @@ class Mechanism:
         Raises:
             SimulationError: a ball, free or ellipsoid joint stands where N is singular.
         """
-        if not self._turning:
+        if not self.turning:
             return self._unit
         values, matrix = self.values(q), np.eye(len(self.coordinates))
-        for mobilizer in self._turning:
+        for mobilizer in self.turning:
             own = list(mobilizer.coordinates)
             matrix[np.ix_(own, own)] = mobilizer.rate_matrix(values[own])
         return matrix
@@ -230,10 +230,10 @@ class Mechanism:
     def rate_bias(self, q: Values, u: Values) -> Array:
         """Ndot u (n,), so that qddot = N udot + Ndot u; raises as :meth:`rate_matrix`."""
         bias = np.zeros(len(self.coordinates))
-        if not self._turning:
+        if not self.turning:
             return bias
         values, speeds = self.values(q), self.speeds(u)
-        for mobilizer in self._turning:
+        for mobilizer in self.turning:
             own = list(mobilizer.coordinates)
             bias[own] = mobilizer.rate_bias(values[own], speeds[own])
         return bias
@@ -241,12 +241,12 @@ class Mechanism:
     def coordinate_rates(self, q: Values, u: Values) -> Array:
         """Rates of the coordinates (n,) for given generalized speeds; raises as :meth:`rate_matrix`."""
         speeds = self.speeds(u)
-        return self.rate_matrix(q) @ speeds if self._turning else speeds.copy()
+        return self.rate_matrix(q) @ speeds if self.turning else speeds.copy()
 
     def speeds_from_rates(self, q: Values, qdot: Values) -> Array:
         """Generalized speeds (n,) for given rates of the coordinates; raises as :meth:`rate_matrix`."""
         rates = self._array(qdot, "rate")
-        if not self._turning:
+        if not self.turning:
             return rates.copy()
         return np.asarray(np.linalg.solve(self.rate_matrix(q), rates), dtype=np.float64)
 
@@ -372,7 +372,7 @@ class Mechanism:
         return unit
 
     @cached_property
-    def _turning(self) -> tuple[Mobilizer, ...]:
+    def turning(self) -> tuple[Mobilizer, ...]:
         """The mobilizers whose speeds are not the rates of their coordinates."""
         return tuple(body.mobilizer for body in self.bodies if not body.mobilizer.speeds_are_rates)
 

@@ -64,15 +64,13 @@ class LinkMotion:
     links: Floats
 
     @classmethod
-    def of(cls, system: System, moments: Moments, accelerations: Floats) -> LinkMotion:
-        """The motion of the links of a system at some moments, with the derivatives (t, n) of its speeds.
+    def of(cls, system: System, moments: Floats, accelerations: Floats) -> LinkMotion:
+        """The motion of the links of a system at some times with their states (t, 1 + y), and rates (t, n) of speeds.
 
         Raises:
             SimulationError: the rates of coordinates are not defined there, or a force cannot be computed.
         """
-        pairs = zip(moments, accelerations, strict=True)
-        found = [system.links_in_motion(t, y, udot) for (t, y), udot in pairs]
-        return cls(system, np.array(found).reshape(len(found), -1, layout.LINK_WORK))
+        return cls(system, system.links_in_motion(moments, accelerations))
 
     def placed(self, body: int, frame: Floats) -> tuple[Floats, Floats]:
         """Rotation (t, 3, 3) and origin (t, 3), m, of a frame (4, 4) of a body (-1 for ground)."""

@@ -185,7 +185,10 @@ class StateLayout:
         """The auxiliary states (k,) by their paths at k states."""
         return dict(zip(self.paths, np.asarray(states)[:, 2 * len(self.order) :].T, strict=True))
 
-    def rows(self, values: Array, speeds: Array, auxiliary: Mapping[str, Array]) -> Array:
-        """States (k, y) from what the histories give."""
+    def rows(self, values: Array, speeds: Array, auxiliary: Mapping[str, Array] | None = None) -> Array:
+        """States (k, y) from what the histories give; the auxiliary ones by default where they start."""
         places = list(self.order)
-        return np.column_stack([values[:, places], speeds[:, places], *(auxiliary[path] for path in self.paths)])
+        moving = np.column_stack([values[:, places], speeds[:, places]])
+        if auxiliary is None:
+            return self.started(moving)
+        return np.column_stack([moving, *(auxiliary[path] for path in self.paths)])

@@ -168,31 +168,23 @@ class System:
         self.note_loads(self._pairs[:, :3])
         return self.found()
 
-    def missing(self, t: float, y: Sequence[float], udot: Sequence[float] | Floats) -> list[float]:
-        """Generalized forces (n,) that a state needs for accelerations (n,) beside gravity and all that pushes.
+    def missing(self, moments: Floats, udot: Floats) -> Floats:
+        """Generalized forces (k, n) that states need for accelerations (k, n) beside gravity and all that pushes.
 
-        Both are in the order of the state. Constraints are left aside.
-
-        Raises:
-            SimulationError: the rates of coordinates are not defined there, or a force cannot be computed.
+        Both are in the order of the state. Constraints are left aside. Moments and errors are those of :meth:`looked`.
         """
-        self._set(t, y)
-        count = len(self.order)
-        self._f[count : 2 * count] = udot
-        inverse = self.program.code.entry("inverse")
-        status = self._run(inverse, self.program.ints, self.numbers, self._w, self._y, self._f, 0)
-        if status != layout.OK:
-            raise self.refusal(status, t, y)
-        return self._f[count : 2 * count].tolist()
+        first = self.room + len(self.order)
+        return self.looked(moments, range(first, first + len(self.order)), udot=udot)
 
-    def links_in_motion(self, t: float, y: Sequence[float], udot: Sequence[float]) -> Floats:
-        """What the kernels find of all links (l, n) that accelerate so.
+    def links_in_motion(self, moments: Floats, udot: Floats) -> Floats:
+        """What the kernels find of all links (k, l, n) that accelerate so.
 
         The wrench of each is what pushes it and all that it carries, gravity too, less what accelerates them: joints
-        and constraints make up for it. Errors are those of :meth:`missing`.
+        and constraints make up for it. Moments and errors are those of :meth:`looked`.
         """
-        self.missing(t, y, udot)
-        return self._links.copy()
+        first = int(self.structure[layout.WORK_LINK])
+        found = self.looked(moments, range(first, first + self._links.size), udot=udot)
+        return found.reshape(-1, *self._links.shape)
 
     def equilibrated(self, t: float, y: Sequence[float], numbers: Floats | None = None) -> list[float]:
         """A state (y,) with the auxiliary states that have an equilibrium in it, as Model::equilibrateMuscles gives it.
@@ -278,24 +270,29 @@ class System:
         """Length of the work vector."""
         return len(self._w)
 
-    def looked(self, moments: Floats, places: Sequence[int], stage: int = layout.FORCE_STAGE) -> Floats:
+    def looked(
+        self, moments: Floats, places: Sequence[int], stage: int = layout.FORCE_STAGE, udot: Floats | None = None
+    ) -> Floats:
         """What is found at some moments, all in one call of the kernels.
 
         Args:
             moments: time (s) and state (k, 1 + y).
             places: of the work vector (m,); from `room` on those of the derivative of the state.
             stage: up to which the states are evaluated.
+            udot: accelerations (k, n) in the order of the state, whose generalized forces are found instead.
 
         Raises:
-            SimulationError: one of them cannot be.
+            SimulationError: the rates of coordinates are not defined at one of them, or a force cannot be computed.
         """
-        given, found = np.ascontiguousarray(moments, dtype=float), np.empty((len(moments), len(places)))
-        if given.shape[1] != 1 + len(self._y):
-            raise self.state.wrong_length(given.shape[1] - 1)
-        self.program.code.make_ready(("look",))
-        order = np.array([len(given), len(places), *places], dtype=np.int64)
+        if moments.shape[1] != 1 + len(self._y):
+            raise self.state.wrong_length(moments.shape[1] - 1)
+        law, code = "evaluate" if udot is None else "inverse", self.program.code
+        code.make_ready(("look", law))
+        moving = np.empty((len(moments), 0)) if udot is None else udot
+        given, found = np.ascontiguousarray(np.hstack([moments, moving])), np.empty((len(moments), len(places)))
+        order = np.array([len(given), moving.shape[1], code.address(law), len(places), *places], dtype=np.int64)
         parts = self.program.ints, self.numbers, self._w, self._y, self._f, stage, given, order, found
-        status = self._run(self.program.code.entry("look"), *parts)
+        status = self._run(code.entry("look"), *parts)
         if status != layout.OK:
             raise self.refusal(status, float(self._w[layout.TIME]), self._y.tolist())
         return found

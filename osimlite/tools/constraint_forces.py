@@ -43,11 +43,11 @@ class ConstraintForces:
         mechanism, system = motion.mechanism, motion.system
         order = list(system.order)
         kept, _ = constraints_on(mechanism, order)
-        states = zip(motion.moments, motion.values, motion.speeds, motion.accelerations, strict=True)
-        for (t, y), q, u, udot in states:
+        needed = system.missing(motion.table, motion.accelerations[:, order])
+        for t, q, u, missing in zip(motion.times.tolist(), motion.values, motion.speeds, needed, strict=True):
             state = mechanism.at(q, u, t)
             blocks = [item.acceleration_equations(state)[0] for item in kept]
-            rows, missing = np.concatenate(blocks)[:, order].T, np.array(system.missing(t, y, udot[order]))
+            rows = np.concatenate(blocks)[:, order].T
             # What has no mass, constraints may drive.
             with suppress(np.linalg.LinAlgError):
                 factor = np.linalg.cholesky(MassCentres.of(state).mass_matrix()[np.ix_(order, order)])

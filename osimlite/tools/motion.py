@@ -53,6 +53,11 @@ class Motion:
         assert isinstance(self.simulation.engine, System)
         return self.simulation.engine
 
+    @cached_property
+    def table(self) -> Array:
+        """Each time with its state (t, 1 + y)."""
+        return np.column_stack([self.times, self.states])
+
     @property
     def moments(self) -> Iterator[tuple[float, list[float]]]:
         """Each time with its state."""
@@ -82,7 +87,7 @@ class Motion:
 
     def looked(self, places: Sequence[int], stage: int = FORCE_STAGE) -> Array:
         """What the kernels find at every time (t, m); see :meth:`System.looked`."""
-        return self.system.looked(np.column_stack([self.times, self.states]), places, stage)
+        return self.system.looked(self.table, places, stage)
 
     def known(self, paths: Sequence[str], *names: str) -> dict[str, Array]:
         """What is known of force elements of some paths at every time (t, m), by the names of their kinds."""
@@ -102,8 +107,7 @@ class Motion:
     def links(self) -> LinkMotion:
         """Where the bodies are and how they move at every time."""
         system = System(self.mechanism.released(), Forces(()))
-        rows = zip(self.values.tolist(), self.speeds.tolist(), strict=True)
-        moments = [(t, system.state.pack(q, u)) for t, (q, u) in zip(self.times.tolist(), rows, strict=True)]
+        moments = np.column_stack([self.times, system.state.rows(self.values, self.speeds)])
         return LinkMotion.of(system, moments, self.accelerations[:, list(system.order)])
 
     def frame(self, asked: str, kind: str, *places: str) -> str | None:

@@ -233,12 +233,14 @@ class RecordedMotion:
         mechanism = self.mechanism
         system = System(mechanism.released(), forces or Forces(()))
         order = list(system.order)
-        first, second = self.rates
+        speeds, accelerations = (rates.copy() for rates in self.rates)
+        if mechanism.turning:
+            for q, u, udot in zip(self.values, speeds, accelerations, strict=True):
+                u[:] = mechanism.speeds_from_rates(q, u)
+                udot[:] = mechanism.speeds_from_rates(q, udot - mechanism.rate_bias(q, u))
+        states = system.state.rows(self.values, speeds)
         rows = np.empty_like(self.values)
-        for time, row, q, qdot, qddot in zip(self.times.tolist(), rows, self.values, first, second, strict=True):
-            u = mechanism.speeds_from_rates(q, qdot)
-            udot = mechanism.speeds_from_rates(q, qddot - mechanism.rate_bias(q, u))
-            row[order] = system.missing(time, system.state.pack(q.tolist(), u.tolist()), udot[order])
+        rows[:, order] = system.missing(np.column_stack([self.times, states]), accelerations[:, order])
         order = [place for body in mechanism.bodies for place in body.mobilizer.coordinates]
         infos = [mechanism.coordinates[place] for place in order]
         labels = [f"{info.name}_{'moment' if info.motion_type == 'rotational' else 'force'}" for info in infos]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import nan
 
 from osimlite.simulation.kernels.layout import (
+    FREEDOMS,
     ITEM_AT,
     ITEMS,
     LAW,
@@ -21,7 +22,7 @@ from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 def look(
     s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int, states: Floats, order: Ints, found: Floats
 ) -> int:
-    """Evaluate states, up to the first that cannot be: its time is in `w` then, and itself in y.
+    """Evaluate states, or accelerate them, up to the first that cannot be: its time is in `w` then, and itself in y.
 
     Args:
         s: the structure.
@@ -30,22 +31,25 @@ def look(
         y: room for a state.
         f: room for its derivative.
         stage: up to which each is evaluated.
-        states: time and state, one after another.
-        order: how many states, how many places are looked at, and these places: of w, and behind it of f.
+        states: time, state, and accelerations if they are given, one after another.
+        order: how many states, how many accelerations, the address of what is called for each state, how many places
+            are looked at, and these places: of w, and behind it of f.
         found: what stands at the places, state by state.
     """
-    size, room, count, looked = s[STATE_SIZE], s[WORK_SIZE], order[0], order[1]
+    size, room, count, moving, law, looked = s[STATE_SIZE], s[WORK_SIZE], order[0], order[1], order[2], order[3]
     for number in range(count):
-        given = at(states, (1 + size) * number)
+        given = at(states, (1 + size + moving) * number)
         w[TIME] = given[0]
         for k in range(size):
             y[k] = given[1 + k]
-        status = call(s[LAWS], s, x, w, y, f, stage)
+        for k in range(moving):
+            f[s[FREEDOMS] + k] = given[1 + size + k]
+        status = call(law, s, x, w, y, f, stage)
         if status != OK:
             return status
         row = at(found, looked * number)
         for k in range(looked):
-            place = order[2 + k]
+            place = order[4 + k]
             row[k] = w[place] if place < room else f[place - room]
     return OK
 

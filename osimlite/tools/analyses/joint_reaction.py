@@ -162,7 +162,7 @@ class _Loads:
         system = System(self.mechanism, motion.simulation.forces, apart=True)
         if controls is not None:
             system.drive(controls)
-        self.moved = LinkMotion.of(system, list(motion.moments), motion.accelerations[:, list(system.order)])
+        self.moved = LinkMotion.of(system, motion.table, motion.accelerations[:, list(system.order)])
         if self.mechanism.constrained:
             for links, forces in zip(self.moved.links, ConstraintForces.along(motion), strict=True):
                 self._push(links, forces)
