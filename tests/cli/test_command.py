@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from importlib import import_module
 from typing import Any
 
@@ -86,3 +88,11 @@ def test_an_option_of_a_simulation_is_declared_once() -> None:
             same = taken.get(each.name)
             if same is not None and each.name in ("wrapping", "skip_unsupported", "integrator", "equilibrate"):
                 assert each.declared.told == same.declared.told and each.default == same.default
+
+
+def test_python_does_not_look_through_all_objects_at_the_end() -> None:
+    # What is registered first is called last.
+    told = "import atexit, gc; atexit.register(lambda: print(gc.get_freeze_count() > 1000))"
+    script = f"{told}; from osimlite.cli import main; main(['--version'])"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.split()[-1] == "True"
