@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, dataclass_transform, get_type_hints
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeVar, cast, dataclass_transform, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -14,7 +15,7 @@ from osimlite.schema.equality import same
 from osimlite.schema.facts import Contradiction, Facts
 from osimlite.schema.fields import Many, ObjectList, Reference, Tag, note_change
 from osimlite.schema.layout import Home, Layout
-from osimlite.schema.specs import FieldSpec, defaults, field_specs, holding, numeric_names, reference_specs
+from osimlite.schema.specs import FieldSpec, defaults, field_specs, holding, numeric_names
 
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass
@@ -25,6 +26,8 @@ else:
 
 
 _SLOTS = ("_model", "_index", "_layout")
+
+T = TypeVar("T", bound="Object")
 
 
 def none() -> Any:
@@ -212,17 +215,18 @@ class Object(BaseModel, metaclass=ObjectType):
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
         memo = {} if memo is None else memo
-        if _COPYING not in memo:
+        outermost = _NAMING not in memo
+        naming: list[tuple[dict[str, Any], str]] = memo.setdefault(_NAMING, [])
+        clone = _cloned(self, memo, naming)
+        if outermost:
             # Components that are only named, not owned, are not part of the copy.
-            memo[_COPYING] = self
-            owned = {id(item) for item in self.walk()}
-            for item in self.walk():
-                for named in _named_components(item):
-                    if id(named) not in owned:
-                        memo[id(named)] = named
-        clone = _carry(self, super().__deepcopy__(memo), copy.deepcopy(self._layout, memo))
-        memo[id(self)] = clone
-        return cast("Self", clone)
+            for state, name in naming:
+                value = state[name]
+                words = value if isinstance(value, tuple) else (value,)
+                known = tuple(memo.setdefault(id(word), word) for word in words)
+                state[name] = known if isinstance(value, tuple) else known[0]
+            del memo[_NAMING]
+        return clone
 
     def __getstate__(self) -> dict[Any, Any]:
         return {**super().__getstate__(), "layout": self._layout, "index": self._index}
@@ -311,8 +315,40 @@ for _base in (Object, Component):
 _set = object.__setattr__
 
 
-_COPYING = -1
-"""Key in the memo of a deep copy that tells the outermost object has been entered; no object has this identity."""
+_NAMING = -1
+"""Key in the memo of a deep copy of what names components, by state and name; no object has this identity."""
+_PLAIN = frozenset((str, float, int, bool, type(None)))
+
+
+def _cloned(item: T, memo: dict[int, Any], naming: list[tuple[dict[str, Any], str]]) -> T:
+    """A copy of an object and of all that it owns; what names components is noted, to be seen to at the end."""
+    if id(item) in memo:
+        return cast("T", memo[id(item)])
+    state, owned = item.__dict__.copy(), _owning(type(item))
+    for name, value in state.items():
+        kind = type(value)
+        if kind in _PLAIN or (kind is tuple and _PLAIN.issuperset(map(type, value))):
+            continue
+        if kind is ObjectList:
+            state[name] = ObjectList(_cloned(each, memo, naming) for each in value)
+        elif name in owned and isinstance(value, Object):
+            state[name] = _cloned(value, memo, naming)
+        elif isinstance(value, Component) or kind is tuple:
+            naming.append((state, name))
+        else:
+            state[name] = copy.deepcopy(value, memo)
+    clone = memo[id(item)] = _new(type(item))
+    _put_state(clone, state)
+    _put_present(clone, item.model_fields_set.copy())
+    _put_extra(clone, None)
+    _put_private(clone, None)
+    layout = item.layout
+    return cast("T", _carry(item, clone, None if layout is None else copy.deepcopy(layout, memo)))
+
+
+@cache
+def _owning(cls: type[Object]) -> frozenset[str]:
+    return frozenset(name for _, name, _, _ in holding(cls))
 
 
 def _adopt(value: Any, owner: Any) -> None:
@@ -326,14 +362,6 @@ def _adopt(value: Any, owner: Any) -> None:
         put_model(value, owner)
         for _, name, _, _ in holding(type(value)):
             _adopt(value.__dict__.get(name), owner)
-
-
-def _named_components(item: Object) -> Iterator[Component]:
-    for spec in reference_specs(type(item)):
-        value = getattr(item, spec.name)
-        for word in value if isinstance(value, tuple) else (value,):
-            if isinstance(word, Component):
-                yield word
 
 
 def _whole(item: Object) -> dict[str, Any]:
