@@ -9,7 +9,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from osimlite.errors import ModelError
+from osimlite.errors import ModelError, OsimliteError
 from osimlite.schema.base import Component, Object
 from osimlite.schema.model import Model
 
@@ -34,7 +34,9 @@ def any_numbers(function: Callable[P, R]) -> Callable[P, R]:
             with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
                 return function(*values, **named)
         except (ArithmeticError, ValueError) as fault:
-            if not isinstance(fault, ArithmeticError | np.linalg.LinAlgError) and str(fault) not in _OF_MATH:
+            is_meant = isinstance(fault, OsimliteError)
+            is_numeric = isinstance(fault, ArithmeticError | np.linalg.LinAlgError) or str(fault) in _OF_MATH
+            if is_meant or not is_numeric:
                 raise
             models = [value for value in (*values, *named.values()) if isinstance(value, Model)]
             what = next((text for model in models if (text := extreme(model))), "a number of the model")

@@ -43,6 +43,10 @@ class MeasuredPath(Silent):
         """The path of its owner."""
         return self.path
 
+    def told(self, record: Sequence[float]) -> str:
+        """What is said of it in a pose in which it has no length."""
+        return f"'{self.path}': the path has no length in this pose"
+
     def items(self, places: Places) -> list[Item]:
         """Its parts, of which the path is no part of another item."""
         *parts, last = self.along.items(places)

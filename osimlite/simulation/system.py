@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from functools import cached_property, partial
+from math import isnan
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -19,11 +20,14 @@ from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
 from osimlite.simulation.elements.controls import Controls
+from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.items import CONTROLS, ForceElement
+from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.engines.linking import Code, Program, best
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pack import pack
+from osimlite.simulation.kernels.paths import LENGTH
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.link_motion import Moments, moving
 from osimlite.simulation.states import StateLayout
@@ -222,7 +226,10 @@ class System:
         """What an item is that has no solution."""
         owner = self._owners[item]
         element: Any = self.forces.elements[owner]
-        place, room = self._items[owner][-1]
+        *parts, (place, room) = self._items[owner]
+        on_path = isinstance(element, DeclaredForce) and element.kind.geometry is PATH
+        if on_path and isnan(self._w[parts[-1][0] + LENGTH]):
+            return f"'{element.path}', whose path has no length in this pose"
         return element.told(self._w[place : place + room].tolist())
 
     def refusal(self, status: int, t: float, y: Sequence[float]) -> SimulationError:

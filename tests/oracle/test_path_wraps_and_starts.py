@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from osimlite.errors import ModelError
+from osimlite.errors import ModelError, OsimliteError
 from osimlite.simulation import Simulation
 
 pytestmark = pytest.mark.oracle
@@ -104,6 +104,120 @@ def test_ranges_of_wraps(tmp_path: Path, ranges: list[str], count: int) -> None:
         (ours,), (arms,) = found.lengths([value, 0.1]).values(), found.moment_arms([value, 0.1]).values()
         assert ours == pytest.approx(length, rel=1e-14)
         assert next(iter(arms.values())) == pytest.approx(arm, abs=1e-9)
+
+
+RUN = """
+s = m.initSystem()
+path, (x, y) = o.GeometryPath.safeDownCast(m.getComponent("/forceset/f/path")), m.getCoordinateSet()
+rows = []
+for values in POSES:
+    for c, value in zip((x, y), values):
+        c.setValue(s, value, False)
+    try:
+        m.realizePosition(s)
+        rows.append(path.getLength(s))
+    except RuntimeError:
+        rows.append(None)
+manager, s = o.Manager(m), m.initializeState()
+manager.setIntegratorAccuracy(1e-7)
+try:
+    manager.initialize(s)
+    s = manager.integrate(0.05)
+    rows.append([c.getValue(s) for c in (x, y)])
+except RuntimeError:
+    rows.append(None)
+print(json.dumps([rows]))
+"""
+POSES = ((0.3, 0.1), (0.0, 0.2), (0.05, 0.0), (-0.1, 0.3))
+SPRING = """<PathSpring name="f">{}<resting_length>0.5</resting_length><stiffness>9</stiffness><dissipation>0.1
+    </dissipation>{}</PathSpring>"""
+LIGAMENT = '<Ligament name="f">{}<resting_length>0.5</resting_length><pcsa_force>10</pcsa_force>{}</Ligament>'
+MUSCLE = """<Thelen2003Muscle name="f">{}<max_isometric_force>10</max_isometric_force><optimal_fiber_length>0.5
+    </optimal_fiber_length><tendon_slack_length>0.3</tendon_slack_length>{}</Thelen2003Muscle>"""
+ACTUATOR = '<PathActuator name="f">{}<optimal_force>5</optimal_force>{}</PathActuator>'
+OFF = "<appliesForce>false</appliesForce>"
+SPHERE, CYLINDER = ("Sphere", "<radius>0.1</radius>"), ("Cylinder", "<radius>0.05</radius><length>1</length>")
+ELLIPSOID, TORUS = (
+    ("Ellipsoid", "<dimensions>0.1 0.07 0.09</dimensions>"),
+    ("Torus", "<inner_radius>0.02</inner_radius><outer_radius>0.08</outer_radius>"),
+)
+
+
+# Of a point a pair of numbers is the range of /jointset/b/b_x in which it counts; of a wrap a missing surface is one
+# that is not active.
+@pytest.mark.parametrize(
+    ("force", "off", "points", "wraps"),
+    [
+        pytest.param(SPRING, "", (0, 0), [("3 3", SPHERE)], id="both beyond"),
+        pytest.param(MUSCLE, "", (0, 0, 0), [("1 4", ELLIPSOID)], id="end beyond"),
+        pytest.param(ACTUATOR, "", (0, 0), [("5 -1", CYLINDER)], id="start beyond"),
+        pytest.param(LIGAMENT, "", (0, 0, 0), [("5 0", TORUS)], id="start beyond and the last"),
+        pytest.param(MUSCLE, "", (0, 0), [("9 4", CYLINDER), ("1 9", SPHERE)], id="start behind end, both beyond"),
+        pytest.param(SPRING, "", (0, 0, 0), [("-7 -2", ELLIPSOID), ("-1 3", SPHERE)], id="negative"),
+        pytest.param(LIGAMENT, OFF, (0, 0), [("1 3", SPHERE)], id="a force that is off"),
+        pytest.param(MUSCLE, OFF, (0, 0, 0), [("2 7", SPHERE)], id="a muscle that is off"),
+        pytest.param(ACTUATOR, "", (0, 0, 0), [("1 9", None), ("1 3", SPHERE)], id="a surface that is off"),
+        pytest.param(SPRING, "", (0, (0.15, 1), 0), [("2 2", SPHERE), ("1 4", SPHERE)], id="not in all poses"),
+        pytest.param(MUSCLE, "", (0, (-1, 0.05), (-1, 0.15), 0), [("2 3", TORUS), ("3 9", SPHERE)], id="two points"),
+        pytest.param(ACTUATOR, "", (0, (0.15, 1), 0), [("2 2", None), ("2 4", SPHERE)], id="by one that is off"),
+        pytest.param(
+            SPRING, "", (0, 0, (0.15, 1), 0), [("-1 2", SPHERE), ("3 -1", TORUS), ("3 5", SPHERE)], id="three"
+        ),
+        pytest.param(LIGAMENT, "", (0, (0.15, 1), 0), [("1 4", SPHERE), ("2 2", SPHERE)], id="before it"),
+    ],
+)
+def test_models_whose_ranges_leave_their_paths(
+    tmp_path: Path, force: str, off: str, points: tuple, wraps: list
+) -> None:
+    placed = [
+        POINT.format(
+            k, "/ground" if k < len(points) - 1 else "/bodyset/a", f"{k / (len(points) - 1) - 0.5} 0.0{k + 2} 0.01"
+        )
+        for k in range(len(points))
+    ]
+    for k, within in enumerate(points):
+        if within:
+            more = "<socket_coordinate>/jointset/b/b_x</socket_coordinate><range>{} {}</range>".format(*within)
+            placed[k] = placed[k].replace("PathPoint", "ConditionalPathPoint").replace("</Cond", more + "</Cond")
+    bent = "".join(
+        f'<PathWrap name="w{k}"><wrap_object>s{k}</wrap_object><range>{ends}</range></PathWrap>'
+        for k, (ends, _) in enumerate(wraps)
+    )
+    surfaces = "".join(
+        f'<Wrap{kind} name="s{k}"><active>{str(surface is not None).lower()}</active><translation>{0.25 * k - 0.2} 0 0'
+        f"</translation>{sizes}</Wrap{kind}>"
+        for k, (_, surface) in enumerate(wraps)
+        for kind, sizes in [surface or SPHERE]
+    )
+    geometry = (
+        f'<GeometryPath name="path"><PathPointSet><objects>{"".join(placed)}</objects></PathPointSet><PathWrapSet>'
+        f"<objects>{bent}</objects></PathWrapSet></GeometryPath>"
+    )
+    ground = f'<Ground name="ground"><WrapObjectSet><objects>{surfaces}</objects></WrapObjectSet></Ground>'
+    path = tmp_path / "m.osim"
+    path.write_text(model(force.format(off, geometry), ground=ground))
+    theirs = answer(RUN.replace("POSES", repr(POSES)), path)
+    assert theirs is not None
+    (*lengths, end), read = theirs[0], osimlite.read(path)
+
+    def length_in(pose: tuple[float, float]) -> float | None:
+        try:
+            return osimlite.paths(read).lengths(list(pose))["/forceset/f"]
+        except OsimliteError:
+            return None
+
+    def moved() -> list[float] | None:
+        try:
+            motion = osimlite.simulate(read, 0.05, "compiled", accuracy=1e-7)
+        except OsimliteError:
+            return None
+        return [motion.columns[name][-1] for name in ("a_x", "b_x")]
+
+    for pose, length in zip(POSES, lengths, strict=True):
+        assert length_in(pose) == (None if length is None else pytest.approx(length, abs=1e-13))
+    assert moved() == (None if end is None else pytest.approx(end, abs=1e-8))
+    # What is an error stops OpenSim.
+    assert not (osimlite.validate(path, select="OSIM617").errors and end)
 
 
 START = """

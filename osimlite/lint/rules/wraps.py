@@ -9,7 +9,7 @@ from osimlite.lint.placement import Pose, Vector, fixed, on_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Component
-from osimlite.schema.paths import GeometryPath, PathPoint, PathWrap
+from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint, PathWrap
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere
 from osimlite.text import counted
 
@@ -69,7 +69,8 @@ def wrap_range(subject: Subject, found: FindingSink) -> None:
 
     The path never wraps around the surface; where the range ends before it begins, OpenSim leaves out all wraps of the
     path that follow as well. Beyond the last point it fails as soon as it computes a length, and its message names no
-    wrap. Points count from 1, and -1 stands for either end.
+    wrap; only in poses where an earlier wrap has none of its conditional points it does not get there. Points count
+    from 1, and -1 stands for either end.
 
     ```xml
     - <PathWrap name="around"> <wrap_object>condyle</wrap_object> <range>2 1</range> </PathWrap>
@@ -77,8 +78,9 @@ def wrap_range(subject: Subject, found: FindingSink) -> None:
     ```
     """
     for path in subject.each(GeometryPath):
-        count = len(path.path_point_set.objects)
-        owner, is_left = subject.tree.parent_of(path), False
+        points = path.path_point_set.objects
+        count = len(points)
+        owner, is_left, may_leave = subject.tree.parent_of(path), False, False
         for wrap in _wraps(path):
             first, last = wrap.range
             surface = subject.target_of(wrap, "wrap_object")
@@ -87,17 +89,20 @@ def wrap_range(subject: Subject, found: FindingSink) -> None:
             start, end = max(first, 1), last if last > 0 else count
             if end > count and start <= end and not (is_left or is_off):
                 fate = "OpenSim fails when it computes its length"
+                fate += ", unless an earlier wrap has no points there" if may_leave else ""
                 found(
                     f"{tells} ends beyond the {counted(count, 'point')} of the path: {fate}",
                     wrap,
                     tag="range",
                     # Nobody asks for the length of a force that is off.
-                    severity=WARNING if getattr(owner, "appliesForce", True) is False else ERROR,
+                    severity=WARNING if may_leave or getattr(owner, "appliesForce", True) is False else ERROR,
                 )
             elif start >= end or end > count:
                 others = " and OpenSim leaves out the wraps after it" if start > end and not is_off else ""
                 found(f"{tells} holds no piece of the path: it never wraps{others}", wrap, tag="range")
             is_left = is_left or (start > end and not is_off)
+            held = points[start - 1 : end]
+            may_leave = may_leave or not (is_off or any(not isinstance(point, ConditionalPathPoint) for point in held))
 
 
 def _base(subject: Subject, surface: WrapObject) -> tuple[Component, Pose] | None:

@@ -12,15 +12,16 @@ application go by the newest one. So do they here.
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, nan
 
 from osimlite.forces.vectors import Vector, minus, norm, plus, put, turned, turned_back, vector
-from osimlite.simulation.kernels.layout import LAW, NUMBERS, OK, RECORD
+from osimlite.simulation.kernels.layout import LAW, NUMBERS, OK, RECORD, UNSOLVED
 from osimlite.simulation.kernels.paths import (
     AT,
     COUNT,
     IS_KEPT,
     KIND,
+    LENGTH,
     LINK,
     NODE_INTS,
     NODE_WORK,
@@ -29,6 +30,7 @@ from osimlite.simulation.kernels.paths import (
     ORDER,
     PLACE,
     POINTS,
+    SPEED,
     STATION,
     SURFACE,
     TANGENT,
@@ -65,6 +67,9 @@ ROUNDS, STILL = 8, 0.0005
 NOWHERE = -2
 """What becomes of a wrap if the path runs through no point of its range; OpenSim then leaves the path as it is."""
 
+BEYOND = -3
+"""What becomes of one whose range ends beyond the path; OpenSim then fails."""
+
 POSE, BEST = ENDS, ENDS + 12
 """The record of a surface: after the piece that is tried, its rotation by rows and its origin in ground; what its law
 has found, from FIRST_TANGENT on, for the piece that is bent."""
@@ -83,6 +88,10 @@ def wrapped_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int)
             if found == NOWHERE:
                 measure_points(s, w, y, item)
                 return OK
+            if found == BEYOND:
+                record = at(w, s[item + RECORD])
+                record[LENGTH] = record[SPEED] = nan
+                return UNSOLVED
             if k == 0:
                 first = found
             elif k == 1:
@@ -132,6 +141,8 @@ def wrap(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int, number:
     own, tangent = at(nodes, NODE_INTS * size + WRAP_INTS * number), points + 2 * number
     if own[BACK] == 0:
         return NONE
+    if own[FIRST] <= own[LAST] and own[LAST] >= points:
+        return BEYOND
     surface = item - own[BACK]
     e = at(w, s[surface + RECORD])
     begin = end = -1

@@ -192,6 +192,8 @@ def read(builder: ElementBuilder, owner: Any) -> ThroughPoints:
     numbers = {id(surface): number for number, surface in enumerate(found)}
     alone = float(len(wraps) == 1)
     surfaces = []
+    # Where a path runs through no point of a range, OpenSim does not look at the wraps that follow in that pose either.
+    may_leave = False
     for wrap, surface in zip(wraps, found, strict=True):
         if type(surface) not in LAWS:
             raise builder.unsupported(owner, f" around the {kind_of(surface)} '{surface.name}'")
@@ -200,13 +202,15 @@ def read(builder: ElementBuilder, owner: Any) -> ThroughPoints:
         if surface.active and first > last and not builder.geodesic:
             # OpenSim goes no further: it does not even look at the wraps that follow.
             break
-        if surface.active and first <= last and last >= len(points):
+        if surface.active and first <= last and last >= len(points) and not may_leave:
             raise ModelError(
                 f"the range of '{builder.path(wrap)}' ends at point {last + 1}; the path has {len(points)}"
             )
+        may_leave |= surface.active and all(point.kind == CONDITIONAL for point in points[first : last + 1])
     if builder.geodesic:
         points = [replace(point, kind=CLAMPED) if point.kind == MOVING else point for point in points]
-        pieces = [(surface, k) for surface in surfaces if surface.law for k in range(surface.first, surface.last)]
+        end = len(points) - 1
+        pieces = [(each, k) for each in surfaces if each.law for k in range(each.first, min(each.last, end))]
         surfaces = [
             replace(surface, number=number, first=k, begin=surface.first) for number, (surface, k) in enumerate(pieces)
         ]
