@@ -2,7 +2,7 @@
 
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
 ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``inverse_kinematics``,
-``FrameSolver``, ``scale``, ``run``, the errors, and every component class under OpenSim's own name
+``FrameSolver``, ``scale``, ``fit``, ``run``, the errors, and every component class under OpenSim's own name
 (``osimlite.PinJoint``). Names are imported when first used, so that importing osimlite costs nothing.
 """
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from osimlite.errors import OsimliteError as OsimliteError
     from osimlite.fitting.frame_solver import FrameSolver as FrameSolver
     from osimlite.fitting.inverse_kinematics import inverse_kinematics as inverse_kinematics
+    from osimlite.fitting.person import fit as fit
     from osimlite.fitting.scale_tool import scale as scale
     from osimlite.lint import validate as validate
     from osimlite.multibody import build_mechanism as mechanism
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
         "Model",
         "OsimliteError",
         "classes_in",
+        "fit",
         "inverse_kinematics",
         "mechanism",
         "muscle_curves",
@@ -67,6 +69,7 @@ _FUNCTIONS = {
     "validate": "osimlite.lint",
     "FrameSolver": "osimlite.fitting.frame_solver",
     "inverse_kinematics": "osimlite.fitting.inverse_kinematics",
+    "fit": "osimlite.fitting.person",
     "scale": "osimlite.fitting.scale_tool",
     "mechanism": "osimlite.multibody:build_mechanism",
     "to_mjcf": "osimlite.translate",

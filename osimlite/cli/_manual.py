@@ -29,6 +29,7 @@ PAGES = {
     "osimlite.cli.rule": "docs/rules.md",
     "osimlite.cli.run": "docs/running-tools.md",
     "osimlite.cli.scale": "docs/fitting.md#scaling",
+    "osimlite.cli.fit": "docs/fitting.md#a-model-that-fits-the-person",
     "osimlite.cli.simulate": "docs/from-opensim.md#simulating",
     "osimlite.cli.sweep": "docs/sweeps.md#a-sweep",
     "osimlite.cli.translate": "docs/urdf.md",

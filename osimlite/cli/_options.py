@@ -40,6 +40,11 @@ Engine = Annotated[
 ]
 FirstFrame = Annotated[float, Option("--from", metavar="SECONDS", help="Time of the first frame that counts.")]
 LastFrame = Annotated[float, Option("--until", metavar="SECONDS", help="Time of the last frame that counts.")]
+Mass = Annotated[float, Option("--mass", metavar="KG", help="What the subject weighs.")]
+Weights = Annotated[
+    list[str] | None,
+    Option("--weight", metavar="NAME=NUMBER", help="How much a marker or sensor counts; 1 if left out, 0 for none."),
+]
 Lowpass = Annotated[
     float | None,
     Option(metavar="HZ", help="Filter the coordinates first, as OpenSim's tools do; 6 is usual.", show_default=False),
@@ -122,6 +127,23 @@ def named_words(words: Iterable[str] | None, option: str, form: str = "NAME=VALU
         if name in found:
             raise SettingError(f"{option} names '{name}' twice; leave one out")
         found[name] = value
+    return found
+
+
+def named_numbers(words: Iterable[str] | None, option: str) -> dict[str, float]:
+    """Numbers by name from the ``NAME=NUMBER`` words of an option.
+
+    Raises:
+        SettingError: a word is not of that form, or two have one name.
+    """
+    from osimlite.errors import SettingError
+
+    found = {}
+    for name, text in named_words(words, option, "NAME=NUMBER").items():
+        try:
+            found[name] = float(text)
+        except ValueError:
+            raise SettingError(f"'{text}' is no number for '{name}'; write {name}=2.5") from None
     return found
 
 

@@ -15,14 +15,7 @@ def ik(
     trial: Annotated[
         Path, Argument(help="Measured markers: .trc, .c3d, .sto; or orientations: .sto.", show_default=False)
     ],
-    weight: Annotated[
-        list[str] | None,
-        Option(
-            "--weight",
-            metavar="NAME=NUMBER",
-            help="How much a marker or sensor counts; 1 if left out, 0 for none.",
-        ),
-    ] = None,
+    weight: options.Weights = None,
     keep: Annotated[
         list[str] | None,
         Option(
@@ -54,8 +47,7 @@ def ik(
     from osimlite.simulation.files.old_storage import UNITS, printed
     from osimlite.simulation.files.storage import write_sto
 
-    weights = {name: _number(text, name) for name, text in options.named_words(weight, "--weight").items()}
-    kept = {name: _number(text, name) for name, text in options.named_words(keep, "--keep").items()}
+    weights, kept = options.named_numbers(weight, "--weight"), options.named_numbers(keep, "--keep")
     of_sensors = holds_orientations(trial)
     motion = inverse_kinematics(
         read(file),
@@ -77,12 +69,3 @@ def ik(
     for line in told(motion):
         say(line)
     say(f"wrote {folder / 'ik.mot'} and {folder / f'{what}_errors.sto'}")
-
-
-def _number(text: str, name: str) -> float:
-    from osimlite.errors import SettingError
-
-    try:
-        return float(text)
-    except ValueError:
-        raise SettingError(f"'{text}' is no number for '{name}'; write {name}=2.5") from None

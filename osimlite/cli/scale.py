@@ -28,7 +28,7 @@ def scale(
         list[str] | None,
         Option("--factor", metavar="BODY=X[,Y,Z]", help="Scale a body by a number, or one for each axis."),
     ] = None,
-    mass: Annotated[float, Option("--mass", metavar="KG", help="What the subject weighs.")] = -1.0,
+    mass: options.Mass = -1.0,
     preserve: Annotated[
         bool, Option("--preserve-masses", help="Let the bodies keep their shares of the mass.")
     ] = False,

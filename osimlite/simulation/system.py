@@ -376,13 +376,14 @@ class System:
 
     def links_at(self, moments: Moments) -> Floats:
         """What the kernels find of the motion of all links at some moments (k, l, n)."""
-        found = np.empty((len(moments), *self._links.shape))
-        for row, (t, y) in zip(found, moments, strict=True):
-            status = self.realize(t, y, layout.VELOCITY_STAGE)
-            if status != layout.OK:
-                raise self.refusal(status, t, y)
-            row[:] = self._links
-        return found
+        return self.links_of(np.array([(t, *y) for t, y in moments]).reshape(len(moments), 1 + len(self._y)))
+
+    def links_of(self, moments: Floats, links: Sequence[int] | None = None) -> Floats:
+        """What the kernels find of the motion of l links, or of all (k, l, n), at times (s) with states (k, 1 + y)."""
+        first, (count, size) = int(self.structure[layout.WORK_LINK]), self._links.shape
+        chosen = range(count) if links is None else links
+        places = [first + size * link + number for link in chosen for number in range(size)]
+        return self.looked(moments, places, layout.VELOCITY_STAGE).reshape(len(moments), len(chosen), size)
 
     def _records(self) -> Iterator[tuple[ForceElement, list[list[float]]]]:
         """Each element with the records of its items, after an evaluation."""

@@ -71,3 +71,22 @@ def test_a_model_is_scaled(lab: Path) -> None:
     assert model["/bodyset/b"].mass == pytest.approx(3.0)
     done = run("scale", "box.osim", "--factor", "b=2,1,1", "-o", "long.osim", folder=lab)
     assert done.code == 0 and osimlite.read(lab / "long.osim")["/markerset/one"].location == (0.2, 0.0, 0.0)
+
+
+def test_a_model_is_fitted_to_a_person(lab: Path) -> None:
+    """Markers stay where they are held; the setup leads to the same model."""
+    done = run("fit", "box.osim", "walk.trc", "--hold", "one", "--hold", "two", "--mass", "3", "-o", "out", folder=lab)
+    assert (done.code, done.err) == (0, "")
+    assert "b: 1.0000 ±" in done.out and "walk.trc: errors of 0.00 cm" in done.out
+    model = osimlite.read(lab / "out" / "box_fitted.osim")
+    assert model.body_set.objects[0].mass == pytest.approx(3.0)
+    assert {path.name for path in (lab / "out").iterdir()} == {
+        "box_fitted.osim", "markers.xml", "markers_unscaled.xml", "scale_set.xml", "setup_scale.xml"
+    }  # fmt: skip
+    assert run("run", "setup_scale.xml", folder=lab / "out").code == 0
+
+
+def test_a_marker_that_is_not_there_cannot_be_held(lab: Path) -> None:
+    """The nearest spelling is told, and nothing is written."""
+    done = run("fit", "box.osim", "walk.trc", "--hold", "on", "-o", "out", folder=lab)
+    assert done.code != 0 and "one" in done.err and not (lab / "out").exists()

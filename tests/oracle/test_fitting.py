@@ -16,10 +16,12 @@ import osimlite
 from osimlite.fitting.ik_tool import run_inverse_kinematics, tasks_of
 from osimlite.fitting.inverse_kinematics import marker_stations
 from osimlite.fitting.marker_data import MarkerData
+from osimlite.fitting.person_files import SETUP, UNSCALED, person_texts
 from osimlite.fitting.pose_layout import Marker
 from osimlite.fitting.scaling import scale_model
 from osimlite.simulation.files.storage import read_sto
 from osimlite.simulation.files.trc import write_trc
+from tests.fitting.test_person import HELD, marked, person
 from tests.fitting.test_pose_fit import cost_of
 from tests.fitting.test_scaling import assert_same
 from tests.tools.test_fitting_tools import unpacked
@@ -189,3 +191,22 @@ def test_public_setups_at_the_best_accuracy(
             for goal, value in zip(tasks.goals, wanted, strict=True)
         ]
         assert cost <= cost_of(mechanism, markers, measured, q) + sum(goals) + 1e-15
+
+
+def test_the_setup_of_a_fit_makes_the_same_model_in_opensim(tmp_path: Path) -> None:
+    """Sizes, masses and places of markers, from the generic model."""
+    osimlite.write(marked(), tmp_path / "generic.osim")
+    found = osimlite.fit(marked(), {"moving": person(4)[0]}, held=HELD, mass=70.0)
+    texts = person_texts(found, tmp_path / "generic.osim", tmp_path, 70.0)
+    for name in (SETUP, UNSCALED):
+        (tmp_path / name).write_text(texts[name])
+    ask(f"import opensim; {QUIET}; opensim.ScaleTool('{SETUP}').run()", tmp_path)
+    theirs = osimlite.read(tmp_path / "generic_fitted.osim")
+    mechanisms = [osimlite.mechanism(model) for model in (found.model, theirs)]
+    q = np.linspace(-0.3, 0.4, len(mechanisms[0].coordinates))
+    ours, others = (mechanism.station_positions(q) for mechanism in mechanisms)
+    assert {*ours} == {*others}
+    for path, place in others.items():
+        assert ours[path] == pytest.approx(place, abs=1e-9), path
+    one, other = (mechanism.mass_matrix(q) for mechanism in mechanisms)
+    assert one == pytest.approx(other, rel=1e-9, abs=1e-9)

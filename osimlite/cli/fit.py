@@ -1,0 +1,72 @@
+"""``osimlite fit``: a model that fits a person, from movements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from osimlite.cli import _options as options
+from osimlite.cli._command import Argument, Option, command
+
+
+@command
+def fit(
+    file: options.File,
+    trials: Annotated[list[Path], Argument(help="Measured markers of movements: .trc, .c3d, .sto.")],
+    static: Annotated[
+        Path | None, Option("--static", metavar="FILE", help="Measured markers of the subject, standing.")
+    ] = None,
+    held: Annotated[
+        list[str] | None,
+        Option("--hold", metavar="NAME", help="A marker that is where the model has it; else those that are fixed."),
+    ] = None,
+    weight: options.Weights = None,
+    by_axis: Annotated[
+        bool, Option("--by-axis", help="Let a body grow in one direction more than in another.")
+    ] = False,
+    sides: Annotated[bool, Option("--each-side", help="Let the two sides of the body differ.")] = False,
+    frames: Annotated[int, Option("--frames", metavar="COUNT", help="How many are looked at, of all trials.")] = 200,
+    mass: options.Mass = -1.0,
+    output: options.Folder = None,
+) -> None:
+    """Fit a model to a person: sizes of its segments and places of its markers, from movements.
+
+    All poses, sizes and places that are likeliest are found at once; joints are where the movements show them. Writes
+    the model, its markers, its scale factors, and a setup with which OpenSim's ScaleTool makes the same model.
+
+    Example: osimlite fit gait2392.osim walk*.trc --static static.trc --hold RASI --hold LASI --mass 72 -o subject
+    """
+    from osimlite.cli._console import say
+    from osimlite.document.reader import read
+    from osimlite.files import make_folder, write_atomically
+    from osimlite.fitting.person import fit as fitted
+    from osimlite.fitting.person_files import person_texts
+
+    person = fitted(
+        read(file),
+        {path.name: path for path in trials},
+        static,
+        weights=options.named_numbers(weight, "--weight"),
+        held=held,
+        by_axis=by_axis,
+        symmetric=not sides,
+        frames=frames,
+        mass=mass,
+    )
+    folder = options.results_folder(file, output)
+    texts = person_texts(person, file, folder, mass)
+    make_folder(folder)
+    for name, text in texts.items():
+        write_atomically(folder / name, text)
+    segments: dict[str, list[str]] = {}
+    for body, own in person.factors.items():
+        numbers = " ".join(f"{factor:.4f}" for factor in (own if by_axis else own[:1]))
+        segments.setdefault(f"{numbers} ± {max(person.uncertain[body]):.3f}", []).append(body)
+    for size, bodies in segments.items():
+        say(f"{', '.join(bodies)}: {size}")
+    before, after = person.errors(person.before), person.errors(person.after)
+    for trial, error in after.items():
+        say(f"{trial}: errors of {100.0 * error:.2f} cm (root mean square), {100.0 * before[trial]:.2f} cm before")
+    for note in person.notes:
+        say(note)
+    say(f"wrote {', '.join(texts)} in {folder}")

@@ -1,0 +1,91 @@
+"""Frames of several trials, chosen so that they say of a person what all of them do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from osimlite.errors import SettingError
+from osimlite.fitting.inverse_kinematics import check_weight
+from osimlite.fitting.marker_data import MarkerData
+from osimlite.multibody.spatial import Array
+from osimlite.text import counted, did_you_mean, listed
+
+STATIC = "static"
+"""What the trial is called in which the subject stands."""
+STANDING = 0.05
+"""Its share of the frames."""
+FEWEST = 3
+"""A frame of fewer markers says nothing of how a person stands."""
+LOST, FAR = 6.0, 0.05
+"""A marker that is so many times as far away as usual, and at least so far (m), was taken for another."""
+
+
+class ChosenFrames:
+    """The frames that are looked at.
+
+    Attributes:
+        markers: names of the m markers that are in the model and in a trial, and count.
+        weights: of them (m,).
+        trials: what each frame is from.
+        times: of the frames (t,), s.
+        measured: (t, m, 3), m; NaN where a marker was not seen.
+        notes: what was left out.
+    """
+
+    def __init__(
+        self, trials: Mapping[str, MarkerData], known: Sequence[str], count: int, weights: Mapping[str, float]
+    ) -> None:
+        for name, weight in weights.items():
+            if name not in known:
+                raise SettingError(f"the model has no marker '{name}'{did_you_mean(name, known)}")
+            check_weight(weight, f"'{name}'")
+        if count < 1:
+            raise SettingError(f"{count} frames are none; give at least 1")
+        shared = {name for trial in trials.values() for name in trial.shared(known)}
+        self.markers = [name for name in known if name in shared and weights.get(name, 1.0) > 0.0]
+        if not self.markers:
+            raise SettingError("no marker counts; give one a weight")
+        self.weights = np.array([weights.get(name, 1.0) for name in self.markers])
+        self.trials, self.notes, times, measured = list[str](), list[str](), list[float](), list[Array]()
+        moving = sum(len(trial.times) for name, trial in trials.items() if name != STATIC)
+        for name, trial in trials.items():
+            share = STANDING if name == STATIC and moving else len(trial.times) / max(moving, 1)
+            rows = np.full((len(trial.times), len(self.markers), 3), np.nan)
+            for place, marker in enumerate(self.markers):
+                if marker in trial.names:
+                    rows[:, place] = trial.positions[:, trial.names.index(marker)]
+            seen = np.flatnonzero(np.isfinite(rows).all(axis=2).sum(axis=1) >= FEWEST)
+            taken = max(1, round(count * min(share, 1.0)))
+            for frame in seen[np.unique(np.linspace(0, len(seen) - 1, taken).round().astype(int))] if len(seen) else ():
+                self.trials.append(name)
+                times.append(float(trial.times[frame]))
+                measured.append(rows[frame])
+            if not len(seen):
+                self.notes.append(f"'{name}' is left out: no frame has three markers of the model")
+        if not measured:
+            raise SettingError("no frame of any trial has three markers of the model")
+        self.times, self.measured = np.array(times), np.array(measured)
+        self.measured[~np.isfinite(self.measured).all(axis=2)] = np.nan
+
+    def left_out(self, places: Array) -> bool:
+        """Leave out what is much further from places (t, m, 3) than the marker usually is; whether there is any."""
+        distances = np.linalg.norm(places - self.measured, axis=2)
+        with np.errstate(all="ignore"):
+            usual = np.array(
+                [np.median(own[np.isfinite(own)]) if np.isfinite(own).any() else 0.0 for own in distances.T]
+            )
+        # What is taken for another pulls its neighbours with it.
+        with np.errstate(invalid="ignore"):
+            worst = np.nanmax(np.where(np.isfinite(distances), distances, 0.0), axis=1, keepdims=True)
+            far = (distances > np.maximum(LOST * usual, FAR)) & (distances > 0.5 * worst)
+        for place in np.flatnonzero(far.any(axis=0)):
+            where = sorted({self.trials[frame] for frame in np.flatnonzero(far[:, place])})
+            number = counted(int(far[:, place].sum()), "frame")
+            self.notes.append(
+                f"{self.markers[place]} is left out in {number} of {listed(where)}: up to "
+                f"{100.0 * np.nanmax(distances[:, place]):.0f} cm away; it may have been taken for another"
+            )
+        self.measured[far] = np.nan
+        return bool(far.any())

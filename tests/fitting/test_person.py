@@ -1,0 +1,196 @@
+"""A model that fits a person: made-up persons are found again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.document.reader import read_any
+from osimlite.errors import OsimliteError, SettingError
+from osimlite.fitting.inverse_kinematics import marker_stations
+from osimlite.fitting.person import fit
+from osimlite.fitting.person_files import SETUP, person_texts
+from osimlite.fitting.scale_tool import run_scale
+from osimlite.fitting.scaling import scale_model
+from osimlite.fitting.segments import Segments, other_side
+from osimlite.fitting.shape import Shape
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.schema.tools.scale import ScaleTool
+from tests.fitting.test_scaling import assert_same
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+SIZES = {"Pelvis": 1.06, "RightThigh": 1.12, "LeftThigh": 1.12, "RightShank": 0.93, "LeftShank": 0.93}
+BONES = {"lateral": (0.0, -0.15, 0.05), "medial": (0.0, -0.15, -0.05)}
+CLUSTER = {"upper": (0.05, 0.02, 0.02), "front": (0.08, -0.1, 0.0), "back": (-0.07, -0.05, 0.03)}
+HELD = tuple(f"{body}_{name}" for body in SIZES for name in BONES)
+
+
+def marked() -> osimlite.Model:
+    """A walker with five markers on each segment."""
+    model = dynamic_walker()
+    for body in list(model.components(osimlite.Body)):
+        if body.name in SIZES:
+            for name, place in (BONES | CLUSTER).items():
+                model.add(osimlite.Marker(name=f"{body.name}_{name}", socket_parent_frame=body, location=place))
+    return model
+
+
+def person(seed: int, noise: float = 0.0, frames: int = 60) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Markers (t, 3) of somebody who moves, and by how much those of the clusters are elsewhere."""
+    rng, model = np.random.default_rng(seed), marked()
+    scale_model(model, {body: (size,) * 3 for body, size in SIZES.items()})
+    offsets = {}
+    for marker in model.components(osimlite.Marker):
+        if marker.name not in HELD:
+            offsets[marker.name] = rng.normal(0.0, 0.02, 3)
+            marker.location = tuple((np.array(marker.location) + offsets[marker.name]).tolist())
+    mechanism = osimlite.mechanism(model)
+    moments, rate = np.arange(frames) / frames, rng.uniform(1.0, 6.0, len(mechanism.coordinates))
+    stations = marker_stations(model, mechanism)
+    found: dict[str, list[Any]] = {name: [] for name in stations}
+    for t in moments:
+        q = 0.5 * np.sin(rate * (t + 0.2))
+        q[mechanism.coordinate_index("platform_rz")] = 0.0
+        state = mechanism.at(q)
+        for name, place in stations.items():
+            found[name].append(state.point(*place) + rng.normal(0.0, noise, 3))
+    return {name: np.array(rows) for name, rows in found.items()}, offsets
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_somebody_is_found_again(seed: int) -> None:
+    """With 5 mm of noise: sizes to 1 %, places of markers to 3 mm."""
+    data, offsets = person(seed, 0.005, 200)
+    model = marked()
+    text = osimlite.to_text(model)
+    found = osimlite.fit(model, {"moving": data}, held=HELD)
+    assert osimlite.to_text(model) == text
+    for body, size in SIZES.items():
+        assert found.factors[body] == pytest.approx([size] * 3, rel=0.01), body
+        assert abs(found.factors[body][0] - size) < 4.0 * found.uncertain[body][0]
+    assert {*found.offsets} == {*offsets}
+    for name, by in offsets.items():
+        assert np.linalg.norm(found.offsets[name] - by) < 0.003, name
+    error = found.errors(found.after)["moving"]
+    assert 0.007 < error < 0.005 * np.sqrt(3.0) and found.errors(found.before)["moving"] > 2.0 * error
+    motion = osimlite.inverse_kinematics(found.model, data)
+    assert motion.summary["rms_marker_error"] == pytest.approx(error, rel=1e-3)
+
+
+def test_two_sides_are_one_unless_asked() -> None:
+    """Of one side alone the markers say what both are."""
+    data, _ = person(5)
+    only = {name: place for name, place in data.items() if not name.startswith("LeftShank")}
+    together = fit(marked(), {"moving": only}, held=HELD)
+    assert together.factors["LeftShank"] == together.factors["RightShank"]
+    apart = fit(marked(), {"moving": data}, held=HELD, symmetric=False, by_axis=True)
+    assert apart.factors["LeftThigh"] != apart.factors["RightThigh"]
+    assert apart.factors["LeftThigh"][1] == pytest.approx(1.12, rel=0.01)
+    assert len(set(apart.factors["LeftThigh"])) == 3
+
+
+def test_a_marker_that_was_taken_for_another_is_left_out() -> None:
+    """And told, with the trial."""
+    data, _ = person(7, 0.002)
+    one, two = "LeftShank_upper", "RightShank_upper"
+    data[one][10:13], data[two][10:13] = data[two][10:13] + 0.3, data[one][10:13] - 0.3
+    found = fit(marked(), {"walk": data}, held=HELD)
+    assert {note.split(" is left out in ")[0] for note in found.notes} == {one, two}
+    assert all("in 3 frames of walk" in note for note in found.notes)
+    assert np.isnan(found.measured[10:13, found.markers.index(one)]).all()
+    assert found.factors["LeftShank"][0] == pytest.approx(0.93, rel=0.01)
+
+
+def test_factors_move_markers_as_the_difference_of_two_models_says() -> None:
+    """Whatever the joints are: to the last digits."""
+    model = osimlite.read(FIXTURES / "kinematics" / "mixed_joint_tree.osim")
+    bodies = [body for body in model.components(osimlite.Body)]
+    for body in bodies:
+        model.add(osimlite.Marker(name=f"on {body.name}", socket_parent_frame=body, location=(0.1, -0.2, 0.3)))
+    names = [f"on {body.name}" for body in bodies]
+    carriers = {body.name: "" for body in bodies}
+    segments = Segments.of(carriers, carriers, by_axis=True, symmetric=False)
+    shape, rng = Shape(model, names, segments), np.random.default_rng(3)
+    sizes = rng.uniform(0.7, 1.4, len(segments.parts))
+    ones = np.ones_like(sizes)
+    mechanism, stations = shape.scaled(sizes)
+    first, places = shape.scaled(ones)
+    values = rng.uniform(-0.5, 0.5, (4, len(mechanism.coordinates)))
+    columns, _ = shape.columns(values)
+    for q, own in zip(values, columns, strict=True):
+        there = [mechanism.at(q).point(*place) for place in stations]
+        here = [first.at(q).point(*place) for place in places]
+        assert np.array(there) == pytest.approx(np.array(here) + own @ (sizes - ones), abs=1e-12)
+
+
+def test_bodies_without_markers_go_with_others() -> None:
+    """The talus with the foot, the patella with the thigh."""
+    carriers = {"pelvis": "ground", "femur_r": "pelvis", "patella_r": "femur_r", "tibia_r": "femur_r"}
+    carriers |= {"talus_r": "tibia_r", "calcn_r": "talus_r", "toes_r": "calcn_r", "femur_l": "pelvis"}
+    marked = {"pelvis", "femur_r", "tibia_r", "calcn_r", "femur_l"}
+    parts = Segments.of(carriers, marked, by_axis=False, symmetric=True).parts
+    groups = [{"pelvis"}, {"femur_r", "femur_l", "patella_r"}, {"tibia_r"}, {"talus_r", "calcn_r", "toes_r"}]
+    assert [set(part.bodies) for part in parts] == groups
+    assert len(Segments.of(carriers, marked, by_axis=True, symmetric=False).parts) == 15
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [("femur_r", "femur_l"), ("LeftShank", "RightShank"), ("r_foot", "l_foot"), ("R_HUMERUS", "L_HUMERUS")],
+)
+def test_names_of_sides(one: str, other: str) -> None:
+    """As models have them."""
+    names = {one: 0, other: 1, "torso": 2, "rotor": 3}
+    assert (other_side(one, names), other_side(other, names)) == (other, one)
+    assert other_side("torso", names) == "torso" and other_side("rotor", names) == "rotor"
+
+
+def test_the_setup_makes_the_same_model(tmp_path: Path) -> None:
+    """With the tool for scaling, from the generic file."""
+    data, _ = person(2)
+    model = marked()
+    osimlite.write(model, tmp_path / "generic.osim")
+    found = fit(model, {"moving": data}, held=HELD, mass=70.0)
+    texts = person_texts(found, tmp_path / "generic.osim", tmp_path / "subject", 70.0)
+    (tmp_path / "subject").mkdir()
+    for name, text in texts.items():
+        (tmp_path / "subject" / name).write_text(text)
+    setup = read_any(tmp_path / "subject" / SETUP)
+    assert isinstance(setup, ScaleTool)
+    made = run_scale(setup, tmp_path / "subject").model
+    assert_same(osimlite.read_text(osimlite.to_text(made)), osimlite.read(tmp_path / "subject" / "generic_fitted.osim"))
+    assert sum(body.mass for body in made.components(osimlite.Body)) == pytest.approx(70.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"held": ["LeftShank_uper"]}, "LeftShank_upper"),
+        ({"weights": {"LeftShank_uper": 1.0}}, "LeftShank_upper"),
+        ({"weights": {"LeftShank_upper": -1.0}}, "no weight"),
+        ({"frames": 0}, "at least 1"),
+        ({"trials": {}}, "at least one trial"),
+        ({"trials": {"walk": {"nose": np.zeros((3, 3))}}}, "nose"),
+        ({"trials": {"walk": {name: np.full((3, 3), np.nan) for name in HELD}}}, "three markers"),
+        ({"trials": {"walk": {HELD[0]: np.zeros((3, 3))}}}, "three markers"),
+    ],
+)
+def test_what_cannot_be_fitted_is_told(given: dict[str, Any], words: str) -> None:
+    """In one sentence."""
+    trials = given.pop("trials", None)
+    with pytest.raises(OsimliteError, match=words) as caught:
+        fit(marked(), {"moving": person(0)[0]} if trials is None else trials, **given)
+    assert isinstance(caught.value, SettingError | OsimliteError)
+
+
+def test_markers_that_stand_still_are_no_reason_to_fail() -> None:
+    """All frozen: the sizes are what the distances say, within what is likely."""
+    data, _ = person(1)
+    frozen = {name: np.tile(rows[0], (20, 1)) for name, rows in data.items()}
+    found = fit(marked(), {"still": frozen}, held=HELD)
+    assert found.errors(found.after)["still"] < 0.01
+    assert max(max(own) for own in found.factors.values()) < 1.6
