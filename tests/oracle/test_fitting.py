@@ -24,6 +24,7 @@ from osimlite.simulation.files.trc import write_trc
 from tests.fitting.test_person import HELD, marked, person
 from tests.fitting.test_pose_fit import cost_of
 from tests.fitting.test_scaling import assert_same
+from tests.fitting.test_turning import poses, trial_of, turner
 from tests.tools.test_fitting_tools import unpacked
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
@@ -210,3 +211,26 @@ def test_the_setup_of_a_fit_makes_the_same_model_in_opensim(tmp_path: Path) -> N
         assert ours[path] == pytest.approx(place, abs=1e-9), path
     one, other = (mechanism.mass_matrix(q) for mechanism in mechanisms)
     assert one == pytest.approx(other, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("step", [8.0, 40.0])
+def test_who_turns_around_is_held_at_the_end_of_the_range_in_opensim(step: float, tmp_path: Path) -> None:
+    """And goes on at the other end here; the cost is never larger."""
+    angles = np.arange(100.0, 480.0, step)
+    model = turner(-180.0, 180.0)
+    mechanism, stations, places = trial_of(model, poses(angles), 0.003)
+    osimlite.write(model, tmp_path / "model.osim")
+    names = [marker.name for marker in model.components(osimlite.Marker)]
+    times = [0.02 * frame for frame in range(len(angles))]
+    write_trc(tmp_path / "trial.trc", times, names, places.reshape(len(angles), -1).tolist())
+    ask(FIT, tmp_path, "1e-9")
+    theirs = read_sto(tmp_path / "theirs.mot")
+    ours = osimlite.inverse_kinematics(model, tmp_path / "trial.trc")
+    markers = [Marker(station) for station in stations]
+    turned = [info.motion_type == "rotational" for info in mechanism.coordinates]
+    values = np.where(turned, np.radians(theirs.rows), theirs.rows)
+    costs = np.array([cost_of(mechanism, markers, place, q) for place, q in zip(places, values, strict=True)])
+    assert (ours.costs <= costs * (1.0 + 1e-9)).all()
+    held = (angles > 185.0) & (angles < 300.0)
+    assert theirs["pelvis_rotation"][held] == pytest.approx(np.full(held.sum(), 180.0), abs=0.1)
+    assert (ours.costs[held] < 0.5 * costs[held]).all()

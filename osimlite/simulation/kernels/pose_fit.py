@@ -171,11 +171,18 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     if leave_ends(m, y, start):
         value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
         steps += more
+    for number in range(size):
+        if go_round(m, y, start, number):
+            value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
+            steps += more
     if kept == 0 and unwind(m, y, last, start, value):
         value, more, status = descend(m, start, y, cost(m, start), lightest, lightest)
         steps += more
     free_ends(m)
-    copy(size, last, at(last, size))
+    before = at(last, size)
+    for k in range(size):
+        # A whole turn, from one end of a range to the other, is no movement to go on with.
+        before[k] = last[k] + 2.0 * pi * floor((y[k] - last[k]) / (2.0 * pi) + 0.5)
     copy(size, y, last)
     history[0], history[1 + POSES * size] = min(kept + 1.0, float(POSES)), value
     look(m, y)
@@ -238,18 +245,43 @@ def turn_round(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: fl
 
     Subjects walk to and fro, and the way down from half a turn away may lead elsewhere.
     """
-    s, p, ranges, is_first = m.s, m.p, at(m.c, m.p[RANGES_AT]), False
-    for link in range(s[LINKS]):
-        j = at(s, s[LINK_AT] + LINK_INTS * link)
-        is_first = is_first or (j[PARENT] < 0 and j[FIRST_FREEDOM] <= freedom < j[END_FREEDOM])
+    s, p, ranges = m.s, m.p, at(m.c, m.p[RANGES_AT])
     move_inwards(m, from_pose, start, 2.0 * INWARDS)
     start[freedom] += angle
     is_inside = ranges[2 * freedom] <= start[freedom] <= ranges[2 * freedom + 1]
-    if not (is_first and is_inside and p[p[RESOLVED_AT] + freedom] in (VARIABLE, AT_END)):
+    if not (is_of_ground(m, freedom) and is_inside and p[p[RESOLVED_AT] + freedom] in (VARIABLE, AT_END)):
         return False
     look(m, from_pose)
     down, turn = vector(m.x, GRAVITY_AT), vector(at(m.w, s[WORK_COLUMN]), 6 * freedom)
     return dot(turn, turn) > 0.0 and 2.0 * dot(turn, down) ** 2 >= dot(turn, turn) * dot(down, down)
+
+
+def is_of_ground(m: Fit, freedom: int) -> bool:
+    """Whether a joint to ground has this degree of freedom."""
+    s, found = m.s, False
+    for link in range(s[LINKS]):
+        j = at(s, s[LINK_AT] + LINK_INTS * link)
+        found = found or (j[PARENT] < 0 and j[FIRST_FREEDOM] <= freedom < j[END_FREEDOM])
+    return found
+
+
+def go_round(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
+    """A pose in which an angle at one end of its range is a whole turn on, or at the other end; false if it is at none.
+
+    Who turns on the spot comes round. Other joints than those to ground do only if their ranges leave out little.
+    """
+    p, ranges = m.p, at(m.c, m.p[RANGES_AT])
+    low, high = ranges[2 * freedom], ranges[2 * freedom + 1]
+    is_low, is_high = y[freedom] <= low + FINEST, y[freedom] >= high - FINEST
+    if is_low == is_high or not high - low < inf or p[p[RESOLVED_AT] + freedom] not in (VARIABLE, AT_END):
+        return False
+    if not (high - low > pi + FINEST or is_of_ground(m, freedom)):
+        return False
+    copy(m.s[FREEDOMS], y, start)
+    start[freedom] = min(high, low + 2.0 * pi) if is_low else max(low, high - 2.0 * pi)
+    look(m, y)
+    turn = vector(at(m.w, m.s[WORK_COLUMN]), 6 * freedom)
+    return dot(turn, turn) > 0.0
 
 
 def leave_ends(m: Fit, y: Floats, start: Floats) -> bool:
