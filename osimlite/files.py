@@ -78,13 +78,15 @@ def read_file(path: str | Path) -> bytes:
 
 
 def stamped(path: str | Path) -> int | None:
-    """What is another number when the content of a file has changed; None if there is no such file."""
+    """What is another number of another file, and when its content has changed; None if there is no such file."""
     if unsaved and (held := unsaved.get(os.path.realpath(path))) is not None:
         return hash(held)
     try:
-        return os.stat(path).st_mtime_ns
+        found = os.stat(path)
     except (OSError, ValueError):
         return None
+    # Whoever puts another file in the place of one may keep the time of its last change.
+    return hash((found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino, found.st_dev))
 
 
 def read_standard_input() -> bytes:

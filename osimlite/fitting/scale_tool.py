@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from osimlite.document.kept import read_anew
 from osimlite.document.printer import to_text
-from osimlite.document.reader import read, read_any
+from osimlite.document.reader import read_any
 from osimlite.errors import DocumentError, SettingError
 from osimlite.fitting.ik_tool import UNNAMED, coordinate_table
 from osimlite.fitting.marker_data import MarkerData
@@ -134,7 +135,7 @@ def run_scale(tool: ScaleTool, folder: Path) -> Scaled:
     maker, scaler, placer = tool.generic_model_maker, tool.model_scaler, tool.marker_placer
     if maker.model_file in UNNAMED:
         raise SettingError("the setup names no model; put its file into model_file of GenericModelMaker")
-    result = Scaled(read(folder / maker.model_file))
+    result = Scaled(read_anew(folder / maker.model_file, Model))
     model = result.model
     if maker.marker_set_file not in UNNAMED:
         add_markers(model, folder / maker.marker_set_file)

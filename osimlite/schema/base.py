@@ -80,6 +80,8 @@ class Object(BaseModel, metaclass=ObjectType):
     abstract: ClassVar[bool] = True
     is_component: ClassVar[bool] = False
     """Whether objects of the class have a place, and so a path, in the component tree."""
+    is_root: ClassVar[bool] = False
+    """Whether they are the top of such a tree."""
     since: ClassVar[str] = ""
     """The version of OpenSim that has the class first, where 4.6 has it not."""
     facts: ClassVar[Facts] = Facts()
@@ -211,13 +213,20 @@ class Object(BaseModel, metaclass=ObjectType):
     __hash__ = None  # type: ignore[assignment]
 
     def __copy__(self) -> Self:
-        return cast("Self", _carry(self, super().__copy__(), self._layout))
+        clone = super().__copy__()
+        put_model(clone, None)
+        put_index(clone, self._index)
+        _put_layout(clone, self._layout)
+        return clone
 
     def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
         memo = {} if memo is None else memo
         outermost = _NAMING not in memo
         naming: list[tuple[dict[str, Any], str]] = memo.setdefault(_NAMING, [])
-        clone = _cloned(self, memo, naming)
+        home = Home() if outermost and self.is_root else None
+        clone = _cloned(self, memo, naming, home)
+        if home is not None:
+            home.model = cast("Model", clone)
         if outermost:
             # Components that are only named, not owned, are not part of the copy.
             for state, name in naming:
@@ -320,7 +329,7 @@ _NAMING = -1
 _PLAIN = frozenset((str, float, int, bool, type(None)))
 
 
-def _cloned(item: T, memo: dict[int, Any], naming: list[tuple[dict[str, Any], str]]) -> T:
+def _cloned(item: T, memo: dict[int, Any], naming: list[tuple[dict[str, Any], str]], home: Home | None) -> T:
     """A copy of an object and of all that it owns; what names components is noted, to be seen to at the end."""
     if id(item) in memo:
         return cast("T", memo[id(item)])
@@ -330,9 +339,9 @@ def _cloned(item: T, memo: dict[int, Any], naming: list[tuple[dict[str, Any], st
         if kind in _PLAIN or (kind is tuple and _PLAIN.issuperset(map(type, value))):
             continue
         if kind is ObjectList:
-            state[name] = ObjectList(_cloned(each, memo, naming) for each in value)
+            state[name] = ObjectList(_cloned(each, memo, naming, home) for each in value)
         elif name in owned and isinstance(value, Object):
-            state[name] = _cloned(value, memo, naming)
+            state[name] = _cloned(value, memo, naming, home)
         elif isinstance(value, Component) or kind is tuple:
             naming.append((state, name))
         else:
@@ -342,8 +351,10 @@ def _cloned(item: T, memo: dict[int, Any], naming: list[tuple[dict[str, Any], st
     _put_present(clone, item.model_fields_set.copy())
     _put_extra(clone, None)
     _put_private(clone, None)
-    layout = item.layout
-    return cast("T", _carry(item, clone, None if layout is None else copy.deepcopy(layout, memo)))
+    put_model(clone, home)
+    put_index(clone, item._index)
+    _put_layout(clone, None if item.layout is None else copy.deepcopy(item.layout, memo))
+    return clone
 
 
 @cache
@@ -373,10 +384,3 @@ def _whole(item: Object) -> dict[str, Any]:
 
 def _unknown(item: Object) -> list[str]:
     return item.layout.unknown if item.layout is not None else []
-
-
-def _carry(original: Any, clone: Any, layout: Layout | None) -> Any:
-    _set(clone, "_model", None)
-    _set(clone, "_index", original._index)
-    _set(clone, "_layout", layout)
-    return clone

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, cast, overload
 
 from osimlite._lazy import shown_in_notebooks
 from osimlite.errors import ModelError, OsimliteError
@@ -41,6 +41,8 @@ class Model(ModelComponent):
     )
 
     __slots__ = ("_tree",)
+
+    is_root: ClassVar[bool] = True
 
     assembly_accuracy: Annotated[float, real(domain="> 0")] = 1e-9
     """How well assembly at the start of a simulation must satisfy constraints; it fails where it cannot."""

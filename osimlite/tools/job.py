@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from osimlite.document.reader import read, read_document
+from osimlite.document.kept import read_anew
+from osimlite.document.reader import read_document
 from osimlite.document.source import Source
 from osimlite.errors import DocumentError
 from osimlite.records import dataclass
@@ -66,7 +67,7 @@ class Job:
         Raises:
             DocumentError: it names none, or that cannot be read.
         """
-        return read(self.needed("model_file"))
+        return read_anew(self.needed("model_file"), Model)
 
     def read(self, path: Path, cls: type) -> Any:
         """An object of a class that another document holds; what it says that means nothing is ignored, as in OpenSim.
