@@ -350,6 +350,11 @@ class System:
         gravity -= sum(float(mass * self.mechanism.gravity @ center) for mass, center in self.masses_in_ground)
         return kinetic, gravity, float(sum(element.energy(records) for element, records in self._records()))
 
+    def energy_of(self, path: str, t: float, y: Sequence[float]) -> float:
+        """Energy stored in one force, J; none in one that does not act."""
+        self.applied(t, y)
+        return float(sum(element.energy(records) for element, records in self._records() if element.path == path))
+
     def _mechanical(self) -> tuple[float, float]:
         """Kinetic energy and potential energy of gravity of all links, after an evaluation."""
         w, inertia = self._links, self.inertia

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +19,7 @@ from osimlite.simulation.link_motion import LinkMotion
 from osimlite.simulation.probed import Moment
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
+from osimlite.tables import suffixes
 from osimlite.text import did_you_mean
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
@@ -41,6 +42,16 @@ class Motion:
     times: Array
     states: Array
     steps: Sequence[Moment] = ()
+
+    @cached_property
+    def _found(self) -> dict[str, Any]:
+        return {}
+
+    def once(self, name: str, find: Callable[[], Any]) -> Any:
+        """What several analyses need, found by the first of them."""
+        if name not in self._found:
+            self._found[name] = find()
+        return self._found[name]
 
     @property
     def mechanism(self) -> Any:
@@ -173,3 +184,16 @@ class Tables:
         path = self.job.in_results(f"{setup.name}_{self.name}{of}_{suffix}")
         table = StoTable(title, self.times, tuple(columns), rows, in_degrees)
         self.outcome.table(path, table, description, setup.output_precision)
+
+    def add_newer(self, suffix: str, columns: Sequence[str], rows: Array, kind: str) -> None:
+        """Have a table written in the newer form of OpenSim's storage files, which is not named after the analysis.
+
+        Args:
+            suffix: end of the file's name.
+            columns: a label for each value.
+            rows: (t, m), where a value of a kind may take several columns.
+            kind: of the values.
+        """
+        labels = tuple(f"{column}{end}" for column in columns for end in suffixes(kind))
+        path = self.job.in_results(f"{self.job.setup.name}_{suffix}")
+        self.outcome.new_table(path, StoTable("", self.times, labels, rows, kind=kind))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import Any
 
@@ -118,8 +119,9 @@ def _looked_up(setup: Setup, tree: Tree, use: Use, text: str) -> tuple[str | Non
         named = kind.target if kind.target == "Actuator" else "component"
         what = named if place or text.startswith("/") else None
         return what, text, tree.walk(text, place, kind.target).target
-    if kind.rule == "state-path" and kind.target == "output" and not text.startswith("/"):
-        text = f"/{text}"
+    if kind.rule == "state-path" and kind.target == "output":
+        # A channel and another name may follow.
+        text = re.sub(r"(?<=\|)([^:(]*).*", r"\1", text if text.startswith("/") else f"/{text}")
     target = tree.lookup(kind, text, tree.model).target if what is not None else None
     return what, text, target or (tree.walk(text, "", "Frame").target if what == "frame" else None)
 

@@ -150,9 +150,11 @@ def _lines(times: Iterable[float], rows: Iterable[Iterable[float]], size: int) -
 def adapter_lines(table: StoTable) -> Iterator[str]:
     """The lines of a table as OpenSim's ``STOFileAdapter`` writes it, without the version of OpenSim."""
     yield "".join(f"{key}={value}\n" for key, value in table.header.items())
-    yield "DataType=double\nversion=3\nendheader\n"
-    yield "\t".join(("time", *table.columns)) + "\n"
-    line = "\t".join(["%.16g"] * (len(table.columns) + 1)) + "\n"
+    yield f"DataType={table.kind}\nversion=3\nendheader\n"
+    ends = suffixes(table.kind)
+    labels = [column.removesuffix(ends[0]) for column in table.columns[:: len(ends)]]
+    yield "\t".join(("time", *labels)) + "\n"
+    line = "\t".join(["%.16g", *[",".join(["%.16g"] * len(ends))] * len(labels)]) + "\n"
     for row in np.column_stack([table.times, table.rows]).tolist():
         yield line % tuple(row)
 

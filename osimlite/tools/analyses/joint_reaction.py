@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.multibody.parts import GROUND
 from osimlite.multibody.schema_frames import Placements
 from osimlite.multibody.spatial import Array
 from osimlite.schema.actuators import (
@@ -23,11 +22,8 @@ from osimlite.schema.tools.analyses import JointReaction
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.files.storage import read_sto
 from osimlite.simulation.given_controls import driven
-from osimlite.simulation.kernels import layout
-from osimlite.simulation.link_motion import LinkMotion
-from osimlite.simulation.system import System
 from osimlite.text import counted, did_you_mean, listed
-from osimlite.tools.constraint_forces import ConstraintForces
+from osimlite.tools.joint_wrenches import JointWrenches
 from osimlite.tools.motion import Motion, Tables
 from osimlite.tools.not_runnable import NotRunnable
 from osimlite.tools.through_time import simulation_of
@@ -47,7 +43,7 @@ def compute(analysis: JointReaction, motion: Motion, tables: Tables) -> None:
     joints = _joints(analysis, model, tables)
     sides = _of_each("apply_on_bodies", analysis.apply_on_bodies or ("child",), joints, tables)
     frames = _of_each("express_in_frame", analysis.express_in_frame or ("ground",), joints, tables)
-    loads = _Loads(*_overridden(analysis, motion, tables))
+    loads = JointWrenches.along(*_overridden(analysis, motion, tables))
     columns: list[str] = []
     rows: list[Array] = []
     for joint, word, asked in zip(joints, sides, frames, strict=True):
@@ -152,42 +148,3 @@ def _ideal(actuator: ScalarActuator) -> ScalarActuator | None:
     ideal = actuator.copy_deep()
     ideal.optimal_force = 1.0
     return ideal
-
-
-class _Loads:
-    """What the joints carry along a motion, by the Newton-Euler equations of the bodies beyond them."""
-
-    def __init__(self, motion: Motion, controls: Controls | None) -> None:
-        self.mechanism = motion.mechanism
-        system = System(self.mechanism, motion.simulation.forces, apart=True)
-        if controls is not None:
-            system.drive(controls)
-        self.moved = LinkMotion.of(system, motion.table, motion.accelerations[:, list(system.order)])
-        if self.mechanism.constrained:
-            for links, forces in zip(self.moved.links, ConstraintForces.along(motion), strict=True):
-                self._push(links, forces)
-        self.carried = {body.mobilizer.joint: place for place, body in enumerate(self.mechanism.bodies)}
-
-    def _push(self, links: Array, forces: ConstraintForces) -> None:
-        """Let constraints push bodies (l, n), and all that carry them."""
-        for constraint, multipliers in forces.multipliers:
-            for body, wrench in zip(constraint.bodies, forces.on_bodies(constraint, multipliers), strict=True):
-                force, here = wrench[3:], forces.state.origins[body]
-                while body != GROUND:
-                    arm = here - links[body, layout.ORIGIN : layout.ORIGIN + 3]
-                    about = np.concatenate([wrench[:3] + np.cross(arm, force), force])
-                    links[body, layout.WRENCH : layout.WRENCH + 6] += about
-                    body = self.mechanism.bodies[body].parent
-
-    def of(self, joint: Joint, side: str) -> tuple[Array, Array, Array]:
-        """Force, moment, and the origin of the joint's frame at which they act (t, 3), in ground."""
-        outer = self.carried[joint.path]
-        body, link = self.mechanism.bodies[outer], self.moved.links[:, outer]
-        mobilizer = body.mobilizer
-        # The body that the joint carries in the tree gets what is missing there, the other one the opposite.
-        is_outer = (side == "child") != mobilizer.reversed
-        wrench = (-1.0 if is_outer else 1.0) * link[:, layout.WRENCH : layout.WRENCH + 6]
-        frame = mobilizer.child_frame if side == "child" else mobilizer.parent_frame
-        _, place = self.moved.placed(outer if is_outer else body.parent, frame)
-        arm = place - link[:, layout.ORIGIN : layout.ORIGIN + 3]
-        return wrench[:, 3:], wrench[:, :3] - np.cross(arm, wrench[:, 3:]), place

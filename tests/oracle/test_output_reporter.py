@@ -1,0 +1,104 @@
+"""Outputs along a motion against OpenSim's OutputReporter, live: every output of every class of component."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.models.jumper import jumper
+from osimlite.schema.model import Model
+from osimlite.schema.outputs import outputs_of
+from osimlite.simulation.files.storage import read_sto
+from osimlite.tools.not_runnable import NotRunnable
+from tests.oracle.test_run_tools import both, real
+
+pytestmark = pytest.mark.oracle
+
+MORE = """<output_precision>16</output_precision><initial_time>0.1</initial_time><final_time>0.2</final_time>
+    <solve_for_equilibrium_for_auxiliary_states>true</solve_for_equilibrium_for_auxiliary_states>
+    <AnalysisSet><objects>
+        <OutputReporter name="O"><step_interval>2</step_interval><output_paths>{}</output_paths></OutputReporter>
+    </objects></AnalysisSet>"""
+STIFF = ("fiber_stiffness", "fiber_stiffness_along_tendon", "muscle_stiffness", "tendon_stiffness")
+NOT_YET = {*STIFF, "passive_force_multiplier"}
+"""Outputs of muscles that are refused."""
+NEVER = {"PathWrapPoint", "PathWrap", "MovingPathPoint"}
+"""OpenSim's own analysis stops at the outputs of the first two, the last is refused here."""
+
+
+def outputs(model: Model) -> list[str]:
+    """Those of the first and the last component of each class that have a type which is reported."""
+    tree = model.tree()
+    by_class: dict[str, list[Any]] = {"Model": [model]}
+    for component in model.components():
+        if not tree.is_internal(component):
+            by_class.setdefault(type(component).__name__, []).append(component)
+    found = []
+    for name, components in by_class.items():
+        for component in {id(one): one for one in (components[0], components[-1])}.values():
+            path = "" if component is model else tree.path_of(component)
+            for output, kind in outputs_of(type(component)).items():  # type: ignore[arg-type]
+                plain = kind.type in ("double", "Vec3", "SpatialVec") and not kind.channels
+                if plain and output not in NOT_YET and name not in NEVER and not output.startswith("implicit"):
+                    found.append(f"{path}|{output}")
+    return found
+
+
+@pytest.mark.parametrize("name", ["m0001", "jumper", "m0013", "m0954"])
+def test_every_output(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """To parts of 1e-8 of the largest of a column; what is of another type is told."""
+    monkeypatch.chdir(tmp_path)
+    model = jumper() if name == "jumper" else osimlite.read(real(corpus, name))
+    asked = " ".join(outputs(model))
+    ours, theirs = both(tmp_path, model, "AnalyzeTool", MORE.format(asked))
+    assert sorted(path.name for path in ours.iterdir()) == sorted(path.name for path in theirs.iterdir())
+    for file in ours.iterdir():
+        known = (theirs / file.name).read_text()
+        head = re.sub("OpenSimVersion=.*\n", "", known).splitlines()[:4]
+        assert file.read_text().splitlines()[:4] == head
+        mine, wanted = read_sto(file), read_sto(theirs / file.name)
+        assert mine.times.tolist() == wanted.times.tolist()
+        largest = np.nanmax(np.abs(wanted.rows), axis=0, initial=0.0)
+        for place, column in enumerate(wanted.columns):
+            apart = np.abs(mine.rows[:, place] - wanted.rows[:, place])
+            # What a stiff tendon stores is as exact as OpenSim's equilibrium, which ends at 1e-8 of a force.
+            near = 1e-6 if column.endswith("potential_energy") else 1e-8
+            assert apart.max() <= near * largest[place] + near, column
+
+
+def test_what_is_no_number_is_left_out_and_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """OpenSim does so, too; an alias is the label of its column."""
+    monkeypatch.chdir(tmp_path)
+    asked = "/bodyset/pelvis|rotation bodyset/pelvis|position(here) |com_position"
+    body = jumper().body_set.objects[0].name
+    ours, theirs = both(tmp_path, jumper(), "AnalyzeTool", MORE.format(asked.replace("pelvis", body)))
+    assert [path.name for path in ours.iterdir()] == [path.name for path in theirs.iterdir()] == ["it_OutputsVec3.sto"]
+    labels = read_sto(theirs / "it_OutputsVec3.sto").columns
+    assert read_sto(ours / "it_OutputsVec3.sto").columns == labels and "here_x" in labels
+    told = dict(osimlite.run(tmp_path / "ours.xml").told)["O"]
+    assert "rotation" in told and "left out" in told
+
+
+@pytest.mark.parametrize(
+    ("asked", "error", "words"),
+    [
+        ("/bodyset/{body}|positon", osimlite.OsimliteError, "positon"),
+        ("/bodyset/nobody|position", osimlite.OsimliteError, "nobody"),
+        ("/forceset/{muscle}|tendon_stiffness", NotRunnable, "tendon_stiffness"),
+    ],
+)
+def test_what_is_not_there_is_told(tmp_path: Path, asked: str, error: type[Exception], words: str) -> None:
+    """Before anything is written."""
+    from tests.tools.test_reporters import tables
+
+    model = jumper()
+    names = {"body": model.body_set.objects[0].name, "muscle": next(iter(model.components(osimlite.Muscle))).name}
+    analysis = f'<OutputReporter name="O"><output_paths>{asked.format(**names)}</output_paths></OutputReporter>'
+    with pytest.raises(error, match=words):
+        tables(tmp_path, model, analysis)
+    assert not list(tmp_path.glob("*Outputs*"))
