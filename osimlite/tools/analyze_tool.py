@@ -6,9 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from osimlite.schema.model import Model
 from osimlite.schema.tools.dynamics import AnalyzeTool
 from osimlite.simulation.files.recorded import RecordedMotion
 from osimlite.simulation.run import Simulation
+from osimlite.text import listed
 from osimlite.tools.job import Job
 from osimlite.tools.motion import Motion
 from osimlite.tools.not_runnable import NotRunnable
@@ -28,7 +30,7 @@ def run(job: Job, outcome: Outcome) -> None:
     model = told_model(job)
     with simulation_of(job, model) as simulation:
         if states is None:
-            first, rows = _followed(job, simulation)
+            first, rows = _followed(job, outcome, simulation, model)
         else:
             given = StateRows.read(job, states, simulation)
             given.tell(outcome)
@@ -45,10 +47,18 @@ def run(job: Job, outcome: Outcome) -> None:
     tell_rows(job, outcome, motion)
 
 
-def _followed(job: Job, simulation: Simulation) -> tuple[int, Iterator[tuple[float, list[float]]]]:
+def _followed(
+    job: Job, outcome: Outcome, simulation: Simulation, model: Model
+) -> tuple[int, Iterator[tuple[float, list[float]]]]:
     """The number of the first row, and times and states from the coordinates of a setup."""
     setup: AnalyzeTool = job.setup
-    recorded = RecordedMotion.read(simulation.mechanism, job.needed("coordinates_file"))
+    mechanism = simulation.mechanism
+    recorded = RecordedMotion.read(mechanism, job.needed("coordinates_file"))
+    infos = enumerate(mechanism.coordinates)
+    if absent := {info.name: k for k, info in infos if info.name in recorded.missing and not info.locked}:
+        # Not their default values: so OpenSim's analyses have it, unlike its inverse dynamics.
+        recorded.values[:, [*absent.values()]] = 0.0
+        outcome.tell("not in the file", f"{listed([*absent])}: 0 is taken, as in OpenSim")
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:
         recorded = recorded.lowpassed(cutoff, continued=True)
@@ -58,6 +68,10 @@ def _followed(job: Job, simulation: Simulation) -> tuple[int, Iterator[tuple[flo
     speeds = recorded.rates[0]
     if simulation.constraints:
         recorded = recorded.assembled()
+        if not model.constraint_set.objects:
+            # Then OpenSim has the speeds fulfil what is prescribed, too.
+            moments = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
+            speeds = np.array([mechanism.project_speeds(q, u, time) for time, q, u in moments])
     rows = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
     first = int(np.searchsorted(before, recorded.times[0]))
     return first, ((t, simulation.state.pack(q.tolist(), u.tolist())) for t, q, u in rows)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 
 import osimlite
 from osimlite.models.jumper import jumper
+from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
 from osimlite.simulation.files.storage import read_sto, write_sto
 
@@ -71,8 +73,11 @@ def real(corpus: Any, name: str) -> Path:
     return path
 
 
-def both(folder: Path, model: Model, tool: str, more: str, cutoff: float = -1.0) -> tuple[Path, Path]:
-    """Where we and OpenSim have put the results of a tool on some motion of a model."""
+def both(
+    folder: Path, model: Model, tool: str, more: str, cutoff: float = -1.0,
+    change: Callable[[Path], object] | None = None,
+) -> tuple[Path, Path]:  # fmt: skip
+    """Where we and OpenSim have put the results of a tool on some motion of a model, which may be changed."""
     osimlite.write(model, folder / "model.osim")
     mechanism = osimlite.mechanism(model)
     times = np.linspace(0.0, 0.5, 26)
@@ -92,6 +97,8 @@ def both(folder: Path, model: Model, tool: str, more: str, cutoff: float = -1.0)
         folder / "motion.mot", "motion", times, mechanism.coordinate_names,
         np.where(turns, np.degrees(rows.T), rows.T).tolist(), in_degrees=True,
     )  # fmt: skip
+    if change is not None:
+        change(folder)
     for results in ("ours", "theirs"):
         (folder / f"{results}.xml").write_text(SETUP.format(tool=tool, results=results, cutoff=cutoff, more=more))
     script = f"import opensim; opensim.Logger.setLevelString('Error'); assert opensim.{tool}('theirs.xml').run()"
@@ -124,6 +131,32 @@ def test_analyses(
     more = ANALYSES.format(start=start, equilibrium=equilibrium, body=body, frame=frame)
     # Muscles in equilibrium hardly move their fibers: what is left of that is rounding.
     compare(*both(tmp_path, model, "AnalyzeTool", more, cutoff), 1e-8, 1e-8)
+
+
+def other_columns(folder: Path) -> None:
+    """Columns of the motion are called as in files of states of several ages, and the last is gone."""
+    table = read_sto(folder / "motion.mot")
+    first, second, *others = (
+        info.path for info in osimlite.mechanism(osimlite.read(folder / "model.osim")).coordinates
+    )
+    names = [f"{first}/value".removeprefix("/jointset/"), f"{second}/value", *(path.split("/")[-1] for path in others)]
+    rows = table.rows[:, :-1].tolist()
+    write_sto(folder / "motion.mot", "motion", table.times, names[:-1], rows, in_degrees=table.in_degrees)
+
+
+@pytest.mark.parametrize("held", ["free", "locked", "prescribed"])
+def test_coordinates_that_a_motion_lacks_or_names_in_old_ways(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, held: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    model = jumper()
+    first, *_, last = model.components(Coordinate)
+    last.default_value, last.locked = 0.4, held == "locked"
+    if held == "prescribed":
+        first.prescribed_function, first.prescribed = osimlite.LinearFunction(coefficients=(0.3, 0.2)), True
+    body, frame = model.body_set.objects[-1].name, model.tree().path_of(model.joint_set.objects[-1].frames[0])
+    more = ANALYSES.format(start=0.1, equilibrium="true", body=body, frame=frame)
+    compare(*both(tmp_path, model, "AnalyzeTool", more, change=other_columns), 1e-8, 1e-8)
 
 
 @pytest.mark.parametrize("cutoff", [-1.0, 6.0, 30.0])

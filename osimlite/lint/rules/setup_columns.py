@@ -22,8 +22,8 @@ def missing_column(setup: Setup, found: FindingSink) -> None:
     alone, analyses take paths too. A task whose value is to come from a file needs its column there, and a table of
     states one for every state of the model.
 
-    OpenSim gives a coordinate without a column its default value, without a word or with a line in the log: the motion
-    is another one.
+    OpenSim gives a coordinate without a column its default value, in analyses 0, without a word or with a line in the
+    log: the motion is another one.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -51,8 +51,8 @@ def missing_column(setup: Setup, found: FindingSink) -> None:
             )
         elif lacking:
             found(
-                f"'{getattr(item, tag)}' has no column {listed(map(repr, lacking))}: OpenSim takes the default value"
-                f"{meant(lacking, columns - names)}",
+                f"'{getattr(item, tag)}' has no column {listed(map(repr, lacking))}: OpenSim takes "
+                f"{'0' if is_a(item, 'AbstractTool') else 'the default value'}{meant(lacking, columns - names)}",
                 item, tag=tag,
             )  # fmt: skip
     for item in setup.named("AbstractTool"):

@@ -23,6 +23,7 @@ from osimlite.schema.tree import is_a
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.simulation.lowpass import lowpassed
+from osimlite.simulation.start import columns_of_states
 from osimlite.simulation.system import System
 from osimlite.text import counted, did_you_mean, listed
 
@@ -84,8 +85,9 @@ class RecordedMotion:
     def read(cls, mechanism: Mechanism, path: str | Path) -> RecordedMotion:
         """The motion in a .mot or .sto file.
 
-        A column is named as the coordinate, or by the path of its value (``/jointset/knee/knee_angle/value``). If
-        the file is in degrees, rotational coordinates are converted, coupled ones are not, as in OpenSim.
+        A column is named as the coordinate, or as its value in a file of states of any age (``/jointset/knee/
+        knee_angle/value``, ``knee/knee_angle/value``). If the file is in degrees, rotational coordinates are
+        converted, coupled ones are not, as in OpenSim.
 
         Raises:
             DocumentError: it is not a storage file, its times do not increase, a coordinate is no number, or no column
@@ -93,22 +95,26 @@ class RecordedMotion:
             ModelError: the mechanism has no coordinates.
         """
         table = read_sto(path)
-        names = {info.path: place for place, info in enumerate(mechanism.coordinates)}
-        for place, info in enumerate(mechanism.coordinates):
-            names.setdefault(info.name, place)
         values = np.tile(mechanism.values({}), (len(table.times), 1))
-        found: set[int] = set()
-        ignored = []
-        for column, label in enumerate(table.columns):
-            place = names.get(label.removesuffix("/value"), -1)
-            if place < 0:
-                # Speeds in a file of states follow from the values, and states of forces are no part of a pose.
-                if label.removesuffix("/speed") not in names and not label.startswith("/forceset/"):
-                    ignored.append(label)
-            elif place not in found:
-                found.add(place)
-                turned = table.in_degrees and mechanism.coordinates[place].motion_type == "rotational"
+        places = {label: place for place, label in reversed([*enumerate(table.columns)])}
+        states = columns_of_states(
+            table.columns, [f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")]
+        )
+        found: dict[int, int] = {}
+        for place, info in enumerate(mechanism.coordinates):
+            columns = (places.get(info.name), places.get(info.path), states.get(f"{info.path}/value"))
+            column = next((one for one in columns if one is not None and one not in found.values()), None)
+            if column is not None:
+                found[place] = column
+                turned = table.in_degrees and info.motion_type == "rotational"
                 values[:, place] = np.radians(table.rows[:, column]) if turned else table.rows[:, column]
+        # Speeds in a file of states follow from the values, and states of forces are no part of a pose.
+        used = {*found.values(), *states.values()}
+        ignored = [
+            label
+            for place, label in enumerate(table.columns)
+            if place not in used and not label.startswith("/forceset/")
+        ]
         if not mechanism.coordinates:
             raise ModelError(f"'{mechanism.name}' has no coordinates: it cannot follow a motion", file=str(path))
         if not found:
