@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite._require import require
 from osimlite.multibody.functions import Univariate
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
@@ -53,17 +52,27 @@ def smoothing_spline(x: ArrayLike, y: ArrayLike, half_order: int, error_variance
         error_variance: of the ordinates; the smoothing is chosen to leave it in the residuals. Zero goes through the
             points, a negative number chooses the smoothing by generalized cross validation.
     """
-    points, values, degree = np.asarray(x, dtype=float), np.asarray(y, dtype=float), 2 * half_order - 1
-    places, scale = _unit_spacing(points)
+    points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     if error_variance != 0.0:
-        values = _smoothed(places, values, half_order, error_variance)
-    spline = _through(places, values, half_order)
-    pieces = np.stack([spline(places, k) / (math.factorial(k) * scale**k) for k in range(degree + 1)], axis=1)
-    before = pieces[:1].copy()
-    for piece in (before, pieces[-1:]):
-        piece[:, half_order:] = 0.0
+        values = _smoothed(_unit_spacing(points)[0], values, half_order, error_variance)
+    (spline,) = natural_splines(points, values[:, None], half_order)
+    return spline
+
+
+def natural_splines(x: ArrayLike, y: ArrayLike, half_order: int) -> list[PiecewisePolynomial]:
+    """The natural splines of degree 2 `half_order` - 1 through the points of k columns.
+
+    Args:
+        x: abscissae (n,) that increase, n >= 2 `half_order`.
+        y: ordinates (n, k).
+        half_order: m.
+    """
+    points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    places, scale = _unit_spacing(points)
+    pieces = _pieces(places, values, half_order) / scale ** np.arange(2.0 * half_order)[:, None]
     # The piece before the first point counts from there too.
-    return PiecewisePolynomial(np.append(points[0], points), np.concatenate([before, pieces]))
+    knots = np.append(points[0], points)
+    return [PiecewisePolynomial(knots, column) for column in np.ascontiguousarray(np.moveaxis(pieces, 2, 0))]
 
 
 def derivatives_of_samples(
@@ -82,9 +91,9 @@ def derivatives_of_samples(
     places, scale = _unit_spacing(points)
     # What lies closer to the point before than rounding of the values would let a slope be found, says nothing.
     kept = np.diff(places, prepend=-1.0) > TOUCHING
-    spline = _through(places[kept], values[kept], half_order)
-    own = (np.asarray(at, dtype=float) - points[0]) / scale
-    return tuple(spline(own, order) / scale**order for order in orders)
+    places, own = places[kept], (np.asarray(at, dtype=float) - points[0]) / scale
+    pieces = _pieces(places, values[kept], half_order)
+    return tuple(_derivative(places, pieces, own, order) / scale**order for order in orders)
 
 
 def _unit_spacing(points: Array) -> tuple[Array, float]:
@@ -93,23 +102,110 @@ def _unit_spacing(points: Array) -> tuple[Array, float]:
     return (points - points[0]) / scale, scale
 
 
-def _through(points: Array, values: Array, half_order: int) -> Any:
-    """SciPy's spline through n points with values (n,) or (n, k): at both ends the derivatives m .. 2m - 2 vanish."""
-    interpolate = require("scipy.interpolate", extra="sim", purpose="a spline")
-    degree, orders = 2 * half_order - 1, range(half_order, 2 * half_order - 1)
-    spline, missing = None, values
-    # The second time mends the rounding of the first, which uneven points make large: SciPy does not scale equations.
-    for _ in range(2):
-        ends = [
-            [(order, np.zeros(values.shape[1:]) if spline is None else -spline(end, order)) for order in orders]
-            for end in points[[0, -1]]
-        ]
-        found = interpolate.make_interp_spline(
-            points, missing, degree, bc_type=ends if orders else None, check_finite=False
-        )
-        spline = found if spline is None else interpolate.BSpline(found.t, spline.c + found.c, degree)
-        missing = values - spline(points)
-    return spline
+def _derivative(points: Array, pieces: Array, at: Array, order: int) -> Array:
+    """A derivative (j, k) at j places of the splines of `_pieces`."""
+    place = np.searchsorted(points, at, side="right")
+    t, own = (at - points[np.maximum(place - 1, 0)])[:, None], pieces[place]
+    found = np.zeros_like(own[:, 0])
+    for power in range(pieces.shape[1] - 1, order - 1, -1):
+        found = found * t + math.perm(power, order) * own[:, power]
+    return found
+
+
+def _pieces(points: Array, values: Array, half_order: int) -> Array:
+    """Coefficients (n + 1, 2 m, k) of natural splines through n points with values (n, k), from the constant up.
+
+    Between two points they go with the distance from the first; before the first point and after the last, where the
+    degree is m - 1, with that from there.
+    """
+    derivatives = _derivatives(points, values, half_order)
+    powers = np.arange(2.0 * half_order)[:, None]
+    width = np.diff(points)[:, None, None] ** powers
+    # What the polynomials are over a unit interval by their values and derivatives at its ends; the first value is 0.
+    ends = np.concatenate([derivatives[:-1], derivatives[1:]], axis=1)
+    ends[:, 0], ends[:, half_order] = 0.0, np.diff(values, axis=0)
+    shapes, _ = _unit_interval(half_order)
+    pieces = np.zeros((len(points) + 1, 2 * half_order, values.shape[1]))
+    pieces[1:-1] = shapes @ (ends * np.tile(width[:, :half_order], (1, 2, 1))) / width
+    pieces[1:, :half_order] = derivatives / np.array([math.factorial(order) for order in range(half_order)])[:, None]
+    pieces[0, :half_order] = pieces[1, :half_order]
+    return pieces
+
+
+def _derivatives(points: Array, values: Array, half_order: int) -> Array:
+    """Derivatives (n, m, k) of orders 0 .. m - 1 at the points of splines through them.
+
+    They make the sum of the integrals of the squared m-th derivative a minimum: each interval is a beam with as many
+    freedoms at both ends.
+    """
+    found = np.empty((len(points), half_order, values.shape[1]))
+    found[:, 0] = values
+    if half_order == 1:
+        return found
+    width, (_, bending) = np.diff(points), _unit_interval(half_order)
+    powers = np.tile(width[:, None] ** np.arange(half_order), 2)
+    stiffness = bending * powers[:, :, None] * powers[:, None, :] * width[:, None, None] ** (1 - 2 * half_order)
+    one, two = slice(1, half_order), slice(half_order + 1, 2 * half_order)
+    diagonal = np.zeros((len(points), half_order - 1, half_order - 1))
+    diagonal[:-1] += stiffness[:, one, one]
+    diagonal[1:] += stiffness[:, two, two]
+    rise, right = np.diff(values, axis=0)[:, None], np.zeros((len(points), half_order - 1, values.shape[1]))
+    right[:-1] -= stiffness[:, one, half_order, None] * rise
+    right[1:] -= stiffness[:, two, half_order, None] * rise
+    found[:, 1:] = _chained(diagonal, stiffness[:, one, two], right)
+    return found
+
+
+@cache
+def _unit_interval(half_order: int) -> tuple[Array, Array]:
+    """Of the polynomial of degree 2 m - 1 by its derivatives up to m - 1 at 0 and, behind these, at 1.
+
+    Returns:
+        Its coefficients from the constant up (2 m, 2 m), and half the second derivatives of the integral of its squared
+        m-th derivative (2 m, 2 m); all are fractions of whole numbers.
+    """
+    size, parts = 2 * half_order, math.factorial(half_order - 1)
+    ends = np.zeros((size, size))
+    for order in range(half_order):
+        ends[order, order] = math.factorial(order)
+        ends[half_order + order] = [math.perm(power, order) for power in range(size)]
+    shapes = np.rint(np.linalg.inv(ends) * parts) / parts
+    falling = np.array([float(math.perm(power, half_order)) for power in range(size)])
+    sums = np.add.outer(np.arange(size), np.arange(size)) - size + 1
+    bending = shapes.T @ (np.outer(falling, falling) / np.maximum(sums, 1)) @ shapes
+    return shapes, np.rint(bending)
+
+
+def _chained(diagonal: Array, beside: Array, right: Array) -> Array:
+    """The solution (n, p, k) of symmetric equations in which each of n unknowns (p, k) meets its neighbours only.
+
+    Every other unknown is eliminated, all at once, until one is left: cyclic reduction (R. Hockney, J. ACM 12, 1965).
+
+    Args:
+        diagonal: blocks (n, p, p), positive definite all together.
+        beside: blocks (n - 1, p, p) behind them.
+        right: right sides (n, p, k).
+    """
+    if len(diagonal) == 1:
+        return np.asarray(np.linalg.solve(diagonal, right), dtype=np.float64)
+    size, before, behind = diagonal.shape[1], beside[::2], beside[1::2]
+    count = len(behind)
+    wide = np.zeros((len(before), size, 2 * size + right.shape[2]))
+    wide[:, :, :size], wide[:count, :, size : 2 * size] = before.transpose(0, 2, 1), behind
+    wide[:, :, 2 * size :] = right[1::2]
+    from_before, from_behind, own = np.split(np.linalg.solve(diagonal[1::2], wide), [size, 2 * size], axis=2)
+    kept, sides = diagonal[::2].copy(), right[::2].copy()
+    kept[: len(before)] -= before @ from_before
+    sides[: len(before)] -= before @ own
+    back = behind.transpose(0, 2, 1)
+    kept[1 : 1 + count] -= back @ from_behind[:count]
+    sides[1 : 1 + count] -= back @ own[:count]
+    found = np.empty_like(right)
+    found[::2] = half = _chained(kept, -before[:count] @ from_behind[:count], sides)
+    own -= from_before @ half[: len(before)]
+    own[:count] -= from_behind[:count] @ half[1 : 1 + count]
+    found[1::2] = own
+    return found
 
 
 def _smoothed(points: Array, values: Array, half_order: int, error_variance: float) -> Array:
@@ -119,7 +215,8 @@ def _smoothed(points: Array, values: Array, half_order: int, error_variance: flo
     # p cheap.
     nodes, weights = np.polynomial.legendre.leggauss(half_order)
     width, middle = np.diff(points) / 2.0, (points[1:] + points[:-1]) / 2.0
-    bends = _through(points, np.eye(n), half_order)((middle[:, None] + width[:, None] * nodes).ravel(), half_order)
+    places = (middle[:, None] + width[:, None] * nodes).ravel()
+    bends = _derivative(points, _pieces(points, np.eye(n), half_order), places, half_order)
     roughness, vectors = np.linalg.eigh(bends.T @ ((width[:, None] * weights).ravel()[:, None] * bends))
     roughness = np.maximum(roughness, 0.0)
     roughness[:half_order] = 0.0

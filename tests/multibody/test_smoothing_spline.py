@@ -132,3 +132,16 @@ def test_samples_at_times_that_differ_by_rounding_are_one(place):
     first, second = derivatives_of_samples(x, np.sin(x)[:, None], x, (1, 2))
     assert first[:, 0] == pytest.approx(np.cos(x), abs=1e-3)
     assert second[10:-10, 0] == pytest.approx(-np.sin(x[10:-10]), abs=1e-4)
+
+
+@pytest.mark.parametrize("half_order", [2, 3, 4])
+def test_long_records_are_as_scipy_has_them(half_order):
+    interpolate = pytest.importorskip("scipy.interpolate")
+    rng = np.random.default_rng(8)
+    x, y = np.cumsum(rng.uniform(0.9, 1.1, 1001)), np.cumsum(rng.normal(size=(1001, 3)), axis=0)
+    ends = [(order, np.zeros(3)) for order in range(half_order, 2 * half_order - 1)]
+    theirs = interpolate.make_interp_spline(x, y, 2 * half_order - 1, bc_type=(ends, ends))
+    at = np.concatenate([x, rng.uniform(x[0], x[-1], 200)])
+    for order, ours in enumerate(derivatives_of_samples(x, y, at, range(half_order), half_order)):
+        expected = theirs(at, order)
+        assert ours == pytest.approx(expected, rel=0.0, abs=1e-10 * np.abs(expected).max())

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from osimlite.errors import SettingError
-from osimlite.simulation.lowpass import lowpassed
+from osimlite.simulation.lowpass import _followed, lowpassed
 
 
 @pytest.mark.parametrize("rows", [2, 3, 4, 7])
@@ -27,3 +27,13 @@ def test_a_wave_at_the_cutoff_loses_half_of_its_size():
 def test_one_row_is_no_motion():
     with pytest.raises(SettingError, match="two rows"):
         lowpassed(np.zeros(1), np.ones((1, 2)), 6.0)
+
+
+@pytest.mark.parametrize("rows", [3, 4, 5, 34, 35, 36, 67, 200])
+def test_values_follow_from_those_before_one_by_one(rows):
+    rng = np.random.default_rng(rows)
+    back, start, given = np.array((-1.9, 1.4, -0.4)), rng.normal(size=(3, 2)), rng.normal(size=(rows - 3, 2))
+    expected = [*start]
+    for row in given:
+        expected.append(row - back[0] * expected[-1] - back[1] * expected[-2] - back[2] * expected[-3])
+    assert _followed(back, start, given) == pytest.approx(np.array(expected), rel=1e-12, abs=1e-12)

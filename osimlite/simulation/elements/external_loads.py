@@ -16,7 +16,7 @@ from osimlite.document.part import read_object
 from osimlite.errors import DocumentError, ModelError
 from osimlite.multibody.functions import Constant, Function, PiecewiseLinear
 from osimlite.multibody.mechanism import FramePlacement, Mechanism
-from osimlite.multibody.smoothing_spline import smoothing_spline
+from osimlite.multibody.smoothing_spline import natural_splines
 from osimlite.multibody.spatial import Array
 from osimlite.schema.prescribed import ExternalForce, ExternalLoads
 from osimlite.simulation.elements.geometries.load import Load
@@ -165,4 +165,4 @@ def functions_of(times: Array, columns: Array) -> list[Function]:
         return [Constant(float(value)) for value in columns[0]]
     if len(times) < 4:
         return [PiecewiseLinear(tuple(times.tolist()), tuple(column)) for column in columns.T.tolist()]
-    return [smoothing_spline(times, column, 2, 0.0) for column in columns.T]
+    return [*natural_splines(times, columns, 2)]

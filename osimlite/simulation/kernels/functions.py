@@ -58,6 +58,10 @@ def function_table(function: f.Function, where: str) -> list[float]:
     if isinstance(function, ArcPoint):
         start = [ARC, factor, float(function.component), function.length, *function.neutral, float(len(SINE_TERMS))]
         return [*start, *SINE_TERMS.tolist(), *COSINE_TERMS.tolist()]
+    if isinstance(function, PiecewisePolynomial):
+        head = PIECES, factor, len(function.knots), function.pieces.shape[1]
+        table: list[float] = np.concatenate([head, function.knots, function.pieces.ravel()]).tolist()
+        return table
     knots, pieces = _pieces(function, where)
     width = max(map(len, pieces))
     rows = [[*piece, *[0.0] * (width - len(piece))] for piece in pieces]
@@ -72,7 +76,8 @@ def table_of_one(function: f.Function, where: str) -> list[float]:
         UnsupportedError: there is no kind for it.
     """
     table = _table_of_one(function, where)
-    if not all(map(isfinite, table)):
+    # A sum that is finite has finite parts only.
+    if not isfinite(sum(table)) and not all(map(isfinite, table)):
         raise ModelError(f"{where} has a number that is not finite; give one that is")
     return table
 
@@ -108,8 +113,6 @@ def _pieces(function: f.Function, where: str) -> tuple[list[float], list[list[fl
     if isinstance(function, f.SimmSpline):
         first, *_, last = pieces = [list(piece) for piece in function.pieces]
         return [function.x[0], *function.x], [first[:2], *pieces[:-1], last[:2]]
-    if isinstance(function, PiecewisePolynomial):
-        return function.knots.tolist(), function.pieces.tolist()
     raise UnsupportedError(f"{where} is a {type(function).__name__}, which cannot be computed; take another function")
 
 
