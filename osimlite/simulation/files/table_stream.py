@@ -64,13 +64,12 @@ class TableStream:
             line = data.decode("utf-8", "replace")
             self.line, self.text = number, line
             text = line.replace(",", " ") if vectors else line
-            words = text.split()
-            if not words:
-                continue
             try:
-                row = [float(word) for word in words]
+                row = list(map(float, text.split()))
             except ValueError:
                 row = self._odd(text, number)
+            if not row:
+                continue
             if len(row) != size:
                 raise DocumentError(
                     f"the row has {counted(len(row), 'number')} and needs {size}",
