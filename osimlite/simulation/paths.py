@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -167,12 +167,16 @@ class Paths:
             for name, row in zip(self.names, arms.tolist(), strict=True)
         }
 
-    def all_moment_arms(self, poses: Array) -> Array:
-        """The same (k, p, n) of all paths about all coordinates, in poses (k, n) in the order of the mechanism."""
+    def all_moment_arms(self, poses: Array, couplings: Iterable[Array] | None = None) -> Array:
+        """The same (k, p, n) of all paths about all coordinates, in poses (k, n) in the order of the mechanism.
+
+        `couplings` are the :meth:`coupling` (n, n) of each pose, where they are known.
+        """
         arms = self.system.pulled(poses)
         if not all(isinstance(item, Lock) for item in self.mechanism.constraints):
-            for row, q in zip(arms, poses, strict=True):
-                row[self._coupled] = row[self._coupled] @ self.coupling(q)
+            each = map(self.coupling, poses) if couplings is None else couplings
+            for row, coupling in zip(arms, each, strict=True):
+                row[self._coupled] = row[self._coupled] @ coupling
         arms[np.abs(arms) <= ROUNDING] = 0.0
         return arms
 
@@ -186,12 +190,21 @@ class Paths:
         if all(isinstance(item, Lock) for item in constraints):
             return np.eye(len(q))
         state = kinematics(self.mechanism, q, np.zeros(len(q)), bodies=self.mechanism.constrained)
-        locks = {item.coordinate: item for item in constraints if isinstance(item, Lock)}
-        coupling = _coupled(constraints, state, [place for place in range(len(q)) if place not in locks])
-        for place, lock in locks.items():
+        coupling = self.coupling_of_free(state)
+        for place, lock in self._locks.items():
             others = [item for item in constraints if item is not lock]
             coupling[:, [place]] = _coupled(others, state, [place])[:, [place]]
         return coupling
+
+    def coupling_of_free(self, state: Kinematics) -> Array:
+        """The same (n, n) in a pose at rest; a locked coordinate has the column of one that nothing goes with."""
+        constraints = self.mechanism.constraints
+        free = [place for place in range(len(state.q)) if place not in self._locks]
+        return _coupled(constraints, state, free if len(constraints) > len(self._locks) else [])
+
+    @cached_property
+    def _locks(self) -> dict[int, Lock]:
+        return {item.coordinate: item for item in self.mechanism.constraints if isinstance(item, Lock)}
 
 
 def _coupled(constraints: Sequence[Constraint], state: Kinematics, places: Sequence[int]) -> Array:

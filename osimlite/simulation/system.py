@@ -20,14 +20,11 @@ from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.items import CONTROLS, ForceElement
-from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.engines.linking import Code, Program, best
 from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.pack import pack
-from osimlite.simulation.kernels.paths import LENGTH
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.link_motion import Moments, moving
 from osimlite.simulation.states import StateLayout
@@ -224,6 +221,10 @@ class System:
 
     def _told(self, item: int) -> str:
         """What an item is that has no solution."""
+        from osimlite.simulation.elements.geometries.path import PATH
+        from osimlite.simulation.elements.kind import DeclaredForce
+        from osimlite.simulation.kernels.paths import LENGTH
+
         owner = self._owners[item]
         element: Any = self.forces.elements[owner]
         *parts, (place, room) = self._items[owner]

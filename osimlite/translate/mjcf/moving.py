@@ -20,6 +20,8 @@ from osimlite.translate.mjcf.polynomials import DEGREE, as_polynomial, sampled
 REACH = 0.02
 """How far (rad) a helper turns: little, so that its inertia hardly weighs on the coordinate that drives it."""
 SAMPLES = 80
+UNIT = np.cos(np.linspace(0.0, np.pi, SAMPLES))
+"""Where functions are looked at, of a span from -1 to 1."""
 STARTS = ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, -0.3, 0.0))
 """Bends of the first quartic, as powers 2, 3 and 4 beside a slope of 1, from which the best is sought."""
 
@@ -30,20 +32,26 @@ def composition(functions: Sequence[Function], span: tuple[float, float]) -> tup
     All are written from the constant on, the first one within -REACH and REACH. Polynomials of up to degree 4 are
     written as they are.
     """
-    return _composition(tuple(functions), span)
-
-
-@cache
-def _composition(functions: tuple[Function, ...], span: tuple[float, float]) -> tuple[Array, Array]:
     exact = [as_polynomial(function) for function in functions]
     known = [item for item in exact if item is not None and item.degree() <= DEGREE]
     if len(known) == len(exact):
         return np.eye(DEGREE + 1)[1], np.array([_padded(item) for item in known])
     low, high = span
-    unit = np.cos(np.linspace(0.0, np.pi, SAMPLES))
-    values = np.stack([sampled(item, 0.5 * (low + high) + 0.5 * (high - low) * unit) for item in functions], axis=1)
+    at = 0.5 * (low + high) + 0.5 * (high - low) * UNIT
+    values = np.stack([sampled(item, at) for item in functions], axis=1)
+    # The two sides of a body have the same functions, or their negatives.
+    signs = np.where(values[0] < 0.0, -1.0, 1.0)
+    bent, rows = _nearest((values * signs).tobytes())
+    normal = Polynomial((-(low + high) / (high - low), 2.0 / (high - low)))
+    slides = np.array([_padded(Chebyshev(row).convert(kind=Polynomial)) for row in (rows * signs).T])
+    return REACH * _padded(Polynomial(bent)(normal)), slides / REACH ** np.arange(DEGREE + 1)
 
-    powers = np.vander(unit, DEGREE + 1, increasing=True)
+
+@cache
+def _nearest(data: bytes) -> tuple[Array, Array]:
+    """The quartic (5,), and by Chebyshev polynomials the quartics (5, k) of it, nearest to values (SAMPLES, k)."""
+    values = np.frombuffer(data).reshape(SAMPLES, -1)
+    powers = np.vander(UNIT, DEGREE + 1, increasing=True)
 
     def first(bends: Array) -> Array:
         bent = np.array((0.0, 1.0, *bends))
@@ -60,10 +68,7 @@ def _composition(functions: tuple[Function, ...], span: tuple[float, float]) -> 
 
     search = require("scipy.optimize", extra="sim", purpose="fits of moving points").least_squares
     best = min((search(lambda bends: 1e3 * second(bends)[1], start) for start in STARTS), key=lambda each: each.cost)
-    rows, _ = second(best.x)
-    normal = Polynomial((-(low + high) / (high - low), 2.0 / (high - low)))
-    slides = np.array([_padded(Chebyshev(row).convert(kind=Polynomial)) for row in rows.T])
-    return REACH * _padded(Polynomial(first(best.x))(normal)), slides / REACH ** np.arange(DEGREE + 1)
+    return first(best.x), second(best.x)[0]
 
 
 def _padded(polynomial: Polynomial) -> Array:

@@ -14,7 +14,7 @@ import math
 from collections import ChainMap
 from collections.abc import Sequence
 from operator import attrgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,8 @@ MOST = 3.0
 """Tensions, as parts of the greatest isometric force, beyond which a pose is none that a body could take."""
 CLOSE = 1e-5
 """Relative change of the curves' error, or of their numbers, at which the search for them ends."""
+STEP = 2.0**-26
+"""Of the numbers of curves, beside 1, to find how their error changes with them."""
 SCALE = 200.0
 """MuJoCo's default of a number that does not count where the force is given."""
 FVMAX = 1.4
@@ -175,14 +177,23 @@ def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curv
         return own
     search = require("scipy.optimize", extra="sim", purpose="muscles of MuJoCo").least_squares
 
-    def curves(x: Array) -> Curves:
-        lmin, lmax, end, fpmax, *rest = x.tolist()
+    def curves(x: Sequence[Any]) -> Curves:
+        lmin, lmax, end, fpmax, *rest = x
         tendon, fiber, strength, shift = rest or (0.0, 0.0, 0.0, 0.0)
         moved = own.tendon + tendon * own.fiber, own.fiber * (1.0 + fiber), own.force * (1.0 + strength)
         return Curves(*moved, lmin, lmax, end, fpmax, shift)
 
     def off(x: Array) -> Array:
-        result: Array = ((curves(x).tensions(lengths) - tensions) / own.force)[known]
+        result: Array = ((curves(x.tolist()).tensions(lengths) - tensions) / own.force)[known]
+        return result
+
+    def slopes(x: Array) -> Array:
+        # As least_squares finds them, all at once: by steps forward, or back where that leaves the bounds.
+        step = np.where(x >= 0.0, STEP, -STEP) * np.maximum(1.0, np.abs(x))
+        step = np.where((x + step < low) | (x + step > high), -step, step)
+        moved = curves([*np.vstack((x, x + np.diag(step))).T[:, :, None]]).tensions(lengths)
+        all_off = ((moved - tensions[:, None]) / own.force).swapaxes(1, 2)[known].T.copy()
+        result: Array = ((all_off[1:] - all_off[0]) / (x + step - x)[:, None]).T
         return result
 
     start, low, high = [own.lmin, own.lmax, own.end, own.fpmax], list(LEAST), list(GREATEST)
@@ -190,6 +201,6 @@ def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curv
         start, low, high = [*start, *[0.0] * 4], [*low, *[-FREE] * 4], [*high, *[FREE] * 4]
     # The curves have kinks: the way from one start may end at one.
     starts = start, [0.2, 2.2, *start[2:]]
-    result = [search(off, each, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for each in starts]
+    result = [search(off, each, slopes, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for each in starts]
     best = min(result, key=lambda each: each.cost)
     return curves(best.x)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.multibody.constraints import Coupler
+from osimlite.multibody.kinematics import kinematics
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
+from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.paths import Paths
 from osimlite.translate.fidelity import Error
 
@@ -23,6 +25,8 @@ EXACT = 1e-9
 @dataclass(frozen=True, eq=False)
 class Poses:
     """P poses of a mechanism of b bodies and n coordinates, of which m move; arrays over bodies end with ground.
+
+    Only the bodies that were asked for, and those that carry them, have numbers that mean something.
 
     Attributes:
         q: values of the coordinates (P, n).
@@ -127,12 +131,23 @@ def free_coordinates(mechanism: Mechanism) -> list[int]:
     ]
 
 
-def random_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mapping[str, Truth]]:
-    """Random poses, and what each path does in them."""
+def bodies_of(paths: Paths) -> set[int]:
+    """Indices of the bodies that paths run along, and of those that constraints bind."""
+    routes = [route for route in paths.routes.values() if isinstance(route, ThroughPoints)]
+    along = {node.body for route in routes for node in (*route.points, *(each.tangent for each in route.surfaces))}
+    return along.union(paths.mechanism.constrained)
+
+
+def random_poses(
+    paths: Paths, count: int, seed: int = 0, bodies: Iterable[int] | None = None
+) -> tuple[Poses, Mapping[str, Truth]]:
+    """Random poses, and what each path does in them; `bodies` are those that are placed, all if None."""
     mechanism = paths.mechanism
     values, moving = random_values(mechanism, count, seed), np.array(free_coordinates(mechanism), dtype=int)
-    states = [mechanism.at(row) for row in values]
-    rates = np.nan_to_num(np.stack([paths.coupling(row)[:, moving] for row in values]))
+    rest = np.zeros(values.shape[1])
+    states = [kinematics(mechanism, row, rest, bodies=bodies) for row in values]
+    couplings = [paths.coupling_of_free(state) for state in states]
+    rates = np.nan_to_num(np.stack([coupling[:, moving] for coupling in couplings]))
     poses = Poses(
         values,
         moving,
@@ -141,16 +156,10 @@ def random_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mappin
         np.stack([state.jacobians @ own for state, own in zip(states, rates, strict=True)], axis=1),
         rates,
     )
-    names = [mechanism.coordinates[place].path for place in moving]
-    lengths = [paths.lengths(row) for row in values]
-    arms = [paths.moment_arms(row) for row in values]
+    lengths = paths.system.lengths(values).T.copy()
+    arms = np.nan_to_num(paths.all_moment_arms(values, couplings)[:, :, moving]).swapaxes(0, 1).copy()
     nodes = [paths.points(row) for row in values]
     truth = {
-        path: Truth(
-            np.array([row[path] for row in lengths]),
-            np.nan_to_num(np.array([[row[path].get(name, 0.0) for name in names] for row in arms]).reshape(count, -1)),
-            [row.get(path, ()) for row in nodes],
-        )
-        for path in paths.names
+        path: Truth(lengths[k], arms[k], [row.get(path, ()) for row in nodes]) for k, path in enumerate(paths.names)
     }
     return poses, truth
