@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
+from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.tools.dynamics import AnalyzeTool
 from osimlite.simulation.files.recorded import RecordedMotion
+from osimlite.simulation.files.storage import read_sto
 from osimlite.simulation.run import Simulation
+from osimlite.simulation.start import columns_of_states
 from osimlite.text import listed
 from osimlite.tools.job import Job
 from osimlite.tools.motion import Motion
-from osimlite.tools.not_runnable import NotRunnable
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.through_time import StateRows, analyse, analyses_of, simulation_of, tell_rows, told_model
+
+SAME_TIME = 2.0**-45.5
+"""How much later or earlier a row of speeds may be than that of the coordinates, s."""
 
 
 def run(job: Job, outcome: Outcome) -> None:
@@ -25,8 +31,6 @@ def run(job: Job, outcome: Outcome) -> None:
     if not analyses:
         raise job.error("none of its analyses is on; give it one")
     states = job.path("states_file")
-    if states is None and job.path("speeds_file") is not None:
-        raise NotRunnable("a speeds_file cannot be taken yet; leave it out, or give a states_file", file=str(job.file))
     model = told_model(job)
     with simulation_of(job, model) as simulation:
         if states is None:
@@ -65,7 +69,8 @@ def _followed(
     before = recorded.times
     recorded = recorded.between(setup.initial_time, setup.final_time)
     # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints change the values.
-    speeds = recorded.rates[0]
+    given = job.path("speeds_file")
+    speeds = recorded.rates[0] if given is None else _given(job, given, recorded)
     if simulation.constraints:
         recorded = recorded.assembled()
         if not model.constraint_set.objects:
@@ -75,3 +80,24 @@ def _followed(
     rows = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
     first = int(np.searchsorted(before, recorded.times[0]))
     return first, ((t, simulation.state.pack(q.tolist(), u.tolist())) for t, q, u in rows)
+
+
+def _given(job: Job, path: Path, recorded: RecordedMotion) -> Array:
+    """The speeds (t, n) of a file at the times of a motion; those without a column are zero.
+
+    Raises:
+        DocumentError: the file has no speeds, or lacks a time.
+    """
+    table, infos = read_sto(path), recorded.mechanism.coordinates
+    paths = [f"{info.path}/speed" for info in infos]
+    columns = columns_of_states(table.columns, paths)
+    if not columns:
+        raise job.error(f"'{path}' has no column with a speed of the model")
+    speeds = np.zeros_like(recorded.values)
+    rows = np.searchsorted(table.times, recorded.times - SAME_TIME)
+    for row, time in zip(rows.tolist(), recorded.times.tolist(), strict=True):
+        if row == len(table.times) or abs(table.times[row] - time) > SAME_TIME:
+            raise job.error(f"'{path}' has no row at {time:.15g} s, at which there are coordinates; give it one")
+    for name, place in columns.items():
+        speeds[:, paths.index(name)] = table.rows[rows, place]
+    return speeds

@@ -159,6 +159,39 @@ def test_coordinates_that_a_motion_lacks_or_names_in_old_ways(
     compare(*both(tmp_path, model, "AnalyzeTool", more, change=other_columns), 1e-8, 1e-8)
 
 
+SPEEDS = """<initial_time>0.1</initial_time><final_time>0.2</final_time><output_precision>16</output_precision>
+    <speeds_file>speeds.sto</speeds_file>
+    <AnalysisSet><objects><Kinematics name="K"/><BodyKinematics name="B"/></objects></AnalysisSet>"""
+
+
+@pytest.mark.parametrize(
+    ("label", "count", "in_degrees"), [("{}/speed", 2, False), ("{}_u", 2, True), ("{}_u", 1, False)]
+)
+def test_speeds_of_a_file(
+    corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, label: str, count: int, in_degrees: bool
+) -> None:
+    """By new and old names, in rad/s whatever the file says; zero without a column."""
+    monkeypatch.chdir(tmp_path)
+    model = osimlite.read(real(corpus, "m0001"))
+    infos = osimlite.mechanism(model).coordinates[:count]
+    times = np.linspace(0.0, 0.5, 26)
+    names = [label.format(info.path if "/" in label else info.name) for info in infos]
+    rows = np.stack([np.cos(3.0 * times + k) for k in range(count)], axis=1)
+    write_sto(tmp_path / "speeds.sto", "speeds", times.tolist(), names, rows.tolist(), in_degrees=in_degrees)
+    compare(*both(tmp_path, model, "AnalyzeTool", SPEEDS), 1e-8, 1e-8)
+
+
+def test_speeds_of_other_times_are_told(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As OpenSim does."""
+    monkeypatch.chdir(tmp_path)
+    write_sto(tmp_path / "speeds.sto", "speeds", [0.0, 0.11, 0.5], ["r_shoulder_elev_u"], [[1.0]] * 3)
+    with pytest.raises(subprocess.CalledProcessError):
+        both(tmp_path, osimlite.read(real(corpus, "m0001")), "AnalyzeTool", SPEEDS)
+    with pytest.raises(osimlite.OsimliteError, match=r"no row at 0\.1 s"):
+        osimlite.run(tmp_path / "ours.xml")
+    assert not (tmp_path / "ours").exists()
+
+
 @pytest.mark.parametrize("cutoff", [-1.0, 6.0, 30.0])
 def test_inverse_dynamics(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cutoff: float) -> None:
     monkeypatch.chdir(tmp_path)
