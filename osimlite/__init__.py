@@ -2,7 +2,7 @@
 
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
 ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``inverse_kinematics``,
-``FrameSolver``, ``scale``, ``fit``, ``run``, the errors, and every component class under OpenSim's own name
+``FrameSolver``, ``scale``, ``fit``, ``run``, ``report``, the errors, and every component class under OpenSim's own name
 (``osimlite.PinJoint``). Names are imported when first used, so that importing osimlite costs nothing.
 """
 
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from osimlite.tools.running import run as run
     from osimlite.translate import to_mjcf as to_mjcf
     from osimlite.translate import to_urdf as to_urdf
+    from osimlite.view.report import report as report
 
     # When the program runs, `__getattr__` makes the list, of the component classes too.
     __all__ = [
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
         "read",
         "read_document",
         "read_text",
+        "report",
         "run",
         "scale",
         "simulate",
@@ -76,6 +78,7 @@ _FUNCTIONS = {
     "to_urdf": "osimlite.translate",
     "muscle_curves": "osimlite.simulation.muscle_curves",
     "paths": "osimlite.simulation.paths",
+    "report": "osimlite.view.report",
     "run": "osimlite.tools.running",
     "simulate": "osimlite.simulation",
     "OsimliteError": "osimlite.errors",

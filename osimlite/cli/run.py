@@ -9,6 +9,8 @@ from osimlite.cli import _sweeping as sweeping
 from osimlite.cli._command import Argument, Option, command
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from osimlite.lint.diagnostic import Report
     from osimlite.tools.many import Trial
     from osimlite.tools.outcome import Outcome
@@ -51,17 +53,30 @@ def run(
     """
     from osimlite.cli._progress import progress_bar
     from osimlite.errors import SettingError
+    from osimlite.files import expect_folder_of
     from osimlite.tools.many import found, run_many
 
     files = found(setups)
-    if report is not None and (as_json or resume or cluster or workers):
-        raise SettingError("--report runs setups one after the other; leave out the other options of how they run")
-    if report is not None or (len(files) == 1 and not as_json and not (resume or cluster)):
-        raise SystemExit(_run_each(files, output, report))
+    if report is not None:
+        if resume or cluster or workers not in (None, 1):
+            raise SettingError("--report runs setups one after the other; leave out --workers, --cluster and --resume")
+        expect_folder_of(report)
+        workers = 1
+    if len(files) == 1 and not as_json and not (resume or cluster):
+        outcome = _run_alone(files[0], output)
+        _write_report({files[0]: outcome}, report)
+        raise SystemExit(0 if outcome.done else 1)
+    kept: dict[str | Path, Outcome] | None = None if report is None else {}
     count = 1 if workers is None and cluster is None and len(files) < WORTH_SHARING else workers
     with progress_bar("running", len(files)) as progress:
         trials = run_many(
-            files, output, workers=count, cluster=cluster, resume=resume, progress=lambda done, of: progress(done, of)
+            files,
+            output,
+            workers=count,
+            cluster=cluster,
+            resume=resume,
+            progress=lambda done, of: progress(done, of),
+            kept=kept,
         )
     if as_json:
         import json
@@ -71,6 +86,8 @@ def run(
         show(json.dumps([vars(trial) for trial in trials], indent=2) + "\n")
     else:
         _show_trials(trials)
+    if kept:
+        _write_report(kept, report, err=as_json)
     raise SystemExit(max(_codes(trials), default=0))
 
 
@@ -80,28 +97,28 @@ def _codes(trials: list[Trial]) -> list[int]:
     return [{DONE: 0, NO: 1}.get(trial.status, 2) for trial in trials]
 
 
-def _run_each(setups: list[Path], output: Path | None, report: Path | None) -> int:
-    """Run setups one after the other, and say of each what came out; the first that fails is the last."""
+def _run_alone(setup: Path, output: Path | None) -> Outcome:
+    """Run a setup, and say what came out."""
     from osimlite.lint.diagnostic import Report
-    from osimlite.tools.many import in_order, places_of
     from osimlite.tools.running import FaultySetup
     from osimlite.tools.running import run as run_setup
 
-    outcomes: dict[str | Path, Outcome] = {}
-    places = places_of(setups, output)
-    for setup in in_order(setups):
-        try:
-            outcomes[setup] = run_setup(setup, places[setup], tell=_show_findings)
-        except FaultySetup as fault:
-            _show_findings(Report(fault.report.errors, fault.report.texts))
-            raise
-        _show(setup, outcomes[setup])
+    try:
+        outcome = run_setup(setup, output, tell=_show_findings)
+    except FaultySetup as fault:
+        _show_findings(Report(fault.report.errors, fault.report.texts))
+        raise
+    _show(setup, outcome)
+    return outcome
+
+
+def _write_report(outcomes: Mapping[str | Path, Outcome], report: Path | None, *, err: bool = False) -> None:
+    from osimlite.cli._console import say
+
     if report is not None:
-        from osimlite.cli._console import say
         from osimlite.view.report import report as write_report
 
-        say(f"wrote {write_report(outcomes, report)}")
-    return 0 if all(outcome.done for outcome in outcomes.values()) else 1
+        say(f"wrote {write_report(outcomes, report)}", err=err)
 
 
 def _show_findings(report: Report) -> None:
@@ -117,7 +134,8 @@ def _show(setup: Path, outcome: Outcome) -> None:
 
     facts = Facts(str(setup), outcome.told)
     if outcome.warnings:
-        facts.add("check", f"{counted(outcome.warnings, 'warning')}; see them with: osimlite validate {setup}")
+        files = " ".join(dict.fromkeys(finding.file or str(setup) for finding in outcome.warnings))
+        facts.add("check", f"{counted(len(outcome.warnings), 'warning')}; see them with: osimlite validate {files}")
     facts.add("files", ", ".join(str(path) for path in outcome.files) or "none")
     facts.show()
 
@@ -138,10 +156,15 @@ def _show_trials(trials: list[Trial]) -> None:
         table.add_column(column, overflow="fold", justify="right" if column == "s" else "left")
     for trial in shown:
         words = trial.message or "; ".join(f"{name} {said}" for name, said in trial.told[:2])
+        if trial.warnings:
+            more = f"; and {counted(len(trial.warnings) - 1, 'warning')} more" if len(trial.warnings) > 1 else ""
+            words = f"{words}; {trial.warnings[0]}{more}"
         seconds = "" if trial.was_done else f"{trial.seconds:.2f}"
         add_row(table, trial.setup, trial.status + (", before" if trial.was_done else ""), seconds, words)
     plain_console().print(table)
     counts = Counter(trial.status for trial in trials)
     told = ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
+    if warned := sum(1 for trial in trials if trial.warnings):
+        told += f", {warned} with warnings"
     more = f" ({len(shown)} shown: those that failed or whose markers are farthest off)" if shown is not trials else ""
     show(f"{counted(len(trials), 'setup')}: {told}{more}\n")

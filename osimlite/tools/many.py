@@ -19,6 +19,7 @@ from osimlite.lint.engine import subject_of
 from osimlite.lint.setup import Setup
 from osimlite.records import dataclass, field
 from osimlite.text import counted, listed
+from osimlite.tools.outcome import Outcome
 from osimlite.tools.running import run
 
 JOURNAL = ".osimlite-run.jsonl"
@@ -41,6 +42,7 @@ class Trial:
         summary: numbers that say how it went.
         files: that were written.
         message: why it failed.
+        warnings: what the check found beside errors; what has a suggestion first.
         seconds: that it took.
         digest: of the setup and all files that it names, as they were.
         was_done: whether that was before this run.
@@ -52,6 +54,7 @@ class Trial:
     summary: dict[str, Any] = field(default_factory=dict)
     files: list[str] = field(default_factory=list)
     message: str = ""
+    warnings: list[str] = field(default_factory=list)
     seconds: float = 0.0
     digest: str = ""
     was_done: bool = False
@@ -89,6 +92,7 @@ def run_many(
     cluster: str | None = None,
     resume: bool = False,
     progress: Callable[[int, int], object] | None = None,
+    kept: dict[str | Path, Outcome] | None = None,
 ) -> list[Trial]:
     """Run setups; one that fails stops none but those that need what it makes.
 
@@ -101,6 +105,7 @@ def run_many(
         cluster: address of a Dask scheduler whose workers do it instead; they see the same files.
         resume: leave out what an earlier run has done, if its inputs and its results are still there unchanged.
         progress: called with how many are done, and of how many.
+        kept: is given what came out of each setup; with one worker, in this process, only.
 
     Returns:
         What became of each, in their order.
@@ -112,7 +117,7 @@ def run_many(
     journal = _Journal(output or Path(), resume, is_kept=len(setups) > 1)
     places = places_of(setups, output)
     work = _Work(setups, journal, progress)
-    do = partial(_one, places)
+    do = partial(_one, places, kept)
     try:
         if cluster is None and workers == 1:
             for setup in work.ready():
@@ -152,7 +157,7 @@ def places_of(setups: Sequence[Path], output: Path | None) -> dict[Path, Path | 
     }
 
 
-def _one(places: dict[Path, Path | None], setup: Path) -> Trial:
+def _one(places: dict[Path, Path | None], kept: dict[str | Path, Outcome] | None, setup: Path) -> Trial:
     """Run one setup; every error of its own is part of the answer."""
     started = time.perf_counter()
     digest = digest_of(setup)
@@ -160,9 +165,18 @@ def _one(places: dict[Path, Path | None], setup: Path) -> Trial:
         outcome = run(setup, places[setup])
     except OsimliteError as error:
         return Trial(str(setup), FAILED, message=str(error), seconds=time.perf_counter() - started)
-    status = DONE if outcome.done else NO
-    files, seconds = [str(file) for file in outcome.files], time.perf_counter() - started
-    return Trial(str(setup), status, outcome.told, _plain(outcome.summary), files, seconds=seconds, digest=digest)
+    if kept is not None:
+        kept[setup] = outcome
+    return Trial(
+        str(setup),
+        DONE if outcome.done else NO,
+        outcome.told,
+        _plain(outcome.summary),
+        files=[str(file) for file in outcome.files],
+        warnings=[str(finding) for finding in outcome.warnings],
+        seconds=time.perf_counter() - started,
+        digest=digest,
+    )
 
 
 def _plain(summary: dict[str, Any]) -> dict[str, Any]:
@@ -312,14 +326,6 @@ class _Work:
                 self.note(pool.result()[1])
         except WorkerLostError:
             self.note(Trial(str(setup), FAILED, message="the process that ran it has ended, twice"))
-
-
-def in_order(setups: Sequence[Path]) -> list[Path]:
-    """Setups so that each comes after those that make what it names."""
-    needs, found = _needs(setups), list[Path]()
-    while len(found) < len(setups):
-        found += [setup for setup in setups if setup not in found and set(needs[setup]) <= set(found)]
-    return found
 
 
 def _needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from osimlite.errors import SimulationError
 from osimlite.files import make_folder, written_atomically
+from osimlite.lint.diagnostic import Finding
 from osimlite.records import dataclass, field, replace
 from osimlite.simulation.files.old_storage import PRECISION, printed
 from osimlite.simulation.files.storage import StoTable, adapter_lines
@@ -32,7 +33,7 @@ class Outcome:
         summary: numbers that say how it went.
         told: the same in words: a name, and what is said of it.
         files: those that were written.
-        warnings: how many the check of the setup and of what it names gave.
+        warnings: what the check of the setup and of what it names found beside errors; what has a suggestion first.
         evidence: what a report shows besides.
         done: whether the tool did what it was asked for; what it found is written all the same.
     """
@@ -41,7 +42,7 @@ class Outcome:
     summary: dict[str, Any] = field(default_factory=dict)
     told: list[tuple[str, str]] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
-    warnings: int = 0
+    warnings: list[Finding] = field(default_factory=list)
     evidence: Evidence | None = None
     done: bool = True
     _texts: dict[Path, Iterable[str]] = field(default_factory=dict)

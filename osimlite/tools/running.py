@@ -54,8 +54,8 @@ def run(
         setup: the file.
         output: a folder for all results, in place of where the setup puts them.
         check: whether the setup and all that it names but the model are checked first.
-        tell: is told, before anything is computed, what is misspelt in the setup although the tool runs with it, such
-            as a marker or a sensor that is left out then.
+        tell: is told, before anything is computed, what is misspelt although the tool runs with it, such as a marker
+            or a sensor that is left out then, or the units of a table.
 
     Returns:
         The tables that were written, as they were before they were rounded to the digits of the files, and a summary.
@@ -75,8 +75,8 @@ def run(
         report = merged(_reports(str(file)))
         if report.errors:
             raise FaultySetup(report)
-        outcome.warnings = len(report.warnings)
-        misspelt = [found for found in report.warnings if found.file == str(file) and found.suggestion is not None]
+        outcome.warnings = sorted(report.warnings, key=lambda found: found.suggestion is None)
+        misspelt = [found for found in outcome.warnings if found.suggestion is not None]
         if tell is not None and misspelt:
             tell(Report(misspelt, report.texts))
     tool = import_module(f"{__package__}.{module_name(tag)}")

@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from osimlite.view.animation import animate as animate
     from osimlite.view.page import Story as Story
     from osimlite.view.plots import plot_simulation as plot_simulation
-    from osimlite.view.report import report as report
     from osimlite.view.shown import Shown as Shown
 
 __getattr__ = imported_when_used(
@@ -20,6 +19,5 @@ __getattr__ = imported_when_used(
         "Story": "osimlite.view.page",
         "animate": "osimlite.view.animation",
         "plot_simulation": "osimlite.view.plots",
-        "report": "osimlite.view.report",
     },
 )

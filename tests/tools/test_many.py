@@ -102,6 +102,28 @@ def test_a_failure_stops_only_what_needs_it_and_is_mended_by_resuming(trials: Pa
     assert kept == times.keys() - {"trial0/id.sto"}
 
 
+def test_warnings_of_each_are_told_in_the_table(trials: Path) -> None:
+    """A misspelt marker, and units that cannot be right."""
+    one, two = trials / "trial0" / "trial.trc", trials / "trial1" / "trial.trc"
+    one.write_text(one.read_text().replace("three", "thre"))
+    setup = trials / "trial0" / "z_ik.xml"
+    task = "<IKMarkerTask name='three'><apply>true</apply><weight>1</weight></IKMarkerTask>"
+    tasks = f"<IKTaskSet><objects>{task.replace('three', 'one')}{task}</objects></IKTaskSet>"
+    setup.write_text(setup.read_text().replace("</model_file>", f"</model_file>{tasks}"))
+    lines = two.read_text().splitlines()
+    lines[2] = lines[2].replace("\tm\t", "\tmm\t")
+    two.write_text("\n".join(lines) + "\n")
+    done = run("run", "trial*/z_ik.xml", folder=trials)
+    said = " ".join(done.out.split())
+    assert done.code == 0 and "3 setups: 3 done, 2 with warnings" in said
+    assert "has no marker 'three'" in said and "(did you mean 'thre'?)" in said
+    noted = json.loads(run("run", "trial*/z_ik.xml", "--json", folder=trials).out)
+    assert [bool(item["warnings"]) for item in noted] == [True, True, False]
+    assert noted[0]["warnings"][0].startswith("trial0/z_ik.xml:")
+    alone = run("run", "trial1/z_ik.xml", folder=trials)
+    assert "trial1/trial.trc:3:" in alone.err and "osimlite validate trial1/trial.trc" in " ".join(alone.out.split())
+
+
 def test_what_is_read_makes_the_digest(trials: Path) -> None:
     setup = trials / "trial0" / "z_ik.xml"
     before = digest_of(setup)

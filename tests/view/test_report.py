@@ -98,6 +98,28 @@ def test_a_page_for_two_trials_needs_nothing_else(trials: Path) -> None:
     assert [marker["name"] for marker in measured["markers"]] == ["one", "two", "three", "four"]
 
 
+def test_a_setup_that_fails_stops_no_report(trials: Path) -> None:
+    (trials / "trial0" / "trial.trc").unlink()
+    words = [f"trial{k}/{name}.xml" for k in range(2) for name in ("id", "z_ik")]
+    done = run("run", *words, "--report", "report.html", folder=trials)
+    assert done.code == 2 and "4 setups: 2 done, 1 failed, 1 not run" in done.out and "wrote report.html" in done.out
+    assert "<h1>trial1</h1>" in (trials / "report.html").read_text()
+
+
+def test_a_report_that_has_no_place_is_told_before_anything_is_run(trials: Path) -> None:
+    done = run("run", "trial0/z_ik.xml", "--report", "no/report.html", folder=trials)
+    assert done.code == 2 and "no/report.html: cannot write here: the folder does not exist" in done.err
+    assert not (trials / "trial0" / "ik.mot").exists()
+
+
+def test_one_call_leaves_the_next_one_possible(trials: Path) -> None:
+    """The module of a function must not take its place in the package."""
+    outcomes: dict[str | Path, Outcome] = {"ik.xml": osimlite.run(trials / "trial0" / "z_ik.xml")}
+    for name in ("one.html", "two.html"):
+        assert osimlite.report(outcomes, trials / name) == trials / name
+        assert (trials / name).is_file()
+
+
 def test_what_is_drawn_are_the_tables(trials: Path, loads: Path) -> None:
     folder = trials / "trial0"
     outcomes: list[Outcome] = [osimlite.run(folder / "z_ik.xml"), osimlite.run(folder / "id.xml")]
