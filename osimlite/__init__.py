@@ -2,8 +2,9 @@
 
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
 ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``inverse_kinematics``,
-``FrameSolver``, ``scale``, ``fit``, ``run``, ``report``, the errors, and every component class under OpenSim's own name
-(``osimlite.PinJoint``). Names are imported when first used, so that importing osimlite costs nothing.
+``FrameSolver``, ``scale``, ``fit``, ``kinematics``, ``inverse_dynamics``, ``run``, ``report``, the errors, and every
+component class under OpenSim's own name (``osimlite.PinJoint``). Names are imported when first used, so that importing
+osimlite costs nothing.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from osimlite.simulation import simulate as simulate
     from osimlite.simulation.muscle_curves import muscle_curves as muscle_curves
     from osimlite.simulation.paths import paths as paths
+    from osimlite.simulation.recorded import inverse_dynamics as inverse_dynamics
+    from osimlite.simulation.recorded import kinematics as kinematics
     from osimlite.tools.running import run as run
     from osimlite.translate import to_mjcf as to_mjcf
     from osimlite.translate import to_urdf as to_urdf
@@ -43,7 +46,9 @@ if TYPE_CHECKING:
         "OsimliteError",
         "classes_in",
         "fit",
+        "inverse_dynamics",
         "inverse_kinematics",
+        "kinematics",
         "mechanism",
         "muscle_curves",
         "paths",
@@ -80,6 +85,8 @@ _FUNCTIONS = {
     "paths": "osimlite.simulation.paths",
     "report": "osimlite.view.report",
     "run": "osimlite.tools.running",
+    "inverse_dynamics": "osimlite.simulation.recorded",
+    "kinematics": "osimlite.simulation.recorded",
     "simulate": "osimlite.simulation",
     "OsimliteError": "osimlite.errors",
 }

@@ -1,4 +1,4 @@
-"""What the commands on recorded motions share: opening a model with a motion, writing tables."""
+"""What the commands on recorded motions share: writing tables."""
 
 from __future__ import annotations
 
@@ -6,21 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from osimlite.cli._console import say
-from osimlite.errors import OsimliteError
 from osimlite.files import make_folder
-from osimlite.multibody import build_mechanism
-from osimlite.schema.model import Model
 from osimlite.simulation.files.recorded import RecordedMotion
 from osimlite.simulation.files.storage import StoTable, write_sto
 from osimlite.text import listed
-
-
-def opened(model: Model, motion: Path, lowpass: float | None) -> RecordedMotion:
-    """The motion of the model, through a filter of `lowpass` Hz if that is given."""
-    recorded = RecordedMotion.read(build_mechanism(model), motion)
-    if not len(recorded.times):
-        raise OsimliteError("the motion has no rows", file=str(motion))
-    return recorded if lowpass is None else recorded.lowpassed(lowpass)
 
 
 def written(recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Path, *, trc: bool = False) -> None:

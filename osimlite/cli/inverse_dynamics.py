@@ -8,12 +8,20 @@ from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
 
 
-@command_with(options.simulating("wrapping", "external_loads"))
+@command_with(options.simulating("wrapping", "external_loads", "opensim_derivatives"))
 def inverse_dynamics(
     file: options.File,
     motion: options.Motion,
-    output: options.Folder = None,
-    lowpass: options.Lowpass = None,
+    applied: Annotated[
+        list[str] | None,
+        Option(
+            "--applied-to",
+            metavar="BODY=FORCE,POINT,MOMENT",
+            help="What columns of a table --external-loads push a body: the beginnings of their labels, f1_,p1_,m1_ "
+            "for the first plate of a .c3d, with + between several loads. Point and moment may be left out.",
+            show_default=False,
+        ),
+    ] = None,
     exclude: Annotated[
         list[str] | None,
         Option(
@@ -22,6 +30,10 @@ def inverse_dynamics(
             show_default=False,
         ),
     ] = None,
+    lowpass: options.Lowpass = None,
+    first: options.FirstFrame = float("-inf"),
+    last: options.LastFrame = float("inf"),
+    output: options.Folder = None,
     **chosen: Any,
 ) -> None:
     """Find the forces of a recorded motion: writes inverse_dynamics.sto.
@@ -32,14 +44,24 @@ def inverse_dynamics(
 
     Example: osimlite inverse-dynamics gait2392.osim walk.mot --lowpass 6 --external-loads grf.xml -o results
     """
-    from osimlite.cli._recorded import opened, written
+    from osimlite.cli._recorded import written
     from osimlite.document.reader import read
-    from osimlite.simulation.elements import force_elements
-    from osimlite.simulation.files.recorded import exclude_forces
+    from osimlite.simulation.recorded import inverse_dynamics as forces_of
 
-    model = read(file)
-    recorded = opened(model, motion, lowpass)
-    exclude_forces(model, exclude or ["Muscles"])
-    forces = force_elements(model, recorded.mechanism, folder=file.parent, **chosen)
-    tables = {"inverse_dynamics.sto": recorded.inverse_dynamics(forces)}
-    written(recorded, tables, options.results_folder(file, output))
+    loads = {
+        body: [load.strip().split(",") for load in text.split("+")]
+        for body, text in options.named_words(applied, "--applied-to", "BODY=FORCE,POINT,MOMENT").items()
+    }
+    table = forces_of(
+        read(file),
+        motion,
+        applied_to=loads,
+        exclude=exclude or ["Muscles"],
+        lowpass=lowpass,
+        start=first,
+        end=last,
+        folder=file.parent,
+        **chosen,
+    )
+    assert table.motion is not None
+    written(table.motion, {"inverse_dynamics.sto": table}, options.results_folder(file, output))

@@ -12,12 +12,14 @@ from osimlite.cli._command import Option, command
 def kinematics(
     file: options.File,
     motion: options.Motion,
-    output: options.Folder = None,
     assemble: Annotated[
         bool, Option("--assemble", help="Change each pose as little as the model's constraints demand first.")
     ] = False,
-    lowpass: options.Lowpass = None,
     trc: Annotated[bool, Option("--trc", help="Write the markers as markers.trc too.")] = False,
+    lowpass: options.Lowpass = None,
+    first: options.FirstFrame = float("-inf"),
+    last: options.LastFrame = float("inf"),
+    output: options.Folder = None,
 ) -> None:
     """Follow a recorded motion: writes bodies.sto and markers.sto.
 
@@ -26,15 +28,10 @@ def kinematics(
 
     Example: osimlite kinematics gait2392.osim walk.mot -o results
     """
-    from osimlite.cli._recorded import opened, written
+    from osimlite.cli._recorded import written
     from osimlite.document.reader import read
+    from osimlite.simulation.recorded import kinematics as followed
 
-    recorded = opened(read(file), motion, lowpass)
-    if assemble:
-        recorded = recorded.assembled()
-    written(
-        recorded,
-        {"bodies.sto": recorded.bodies(), "markers.sto": recorded.markers()},
-        options.results_folder(file, output),
-        trc=trc,
-    )
+    recorded = followed(read(file), motion, assemble=assemble, lowpass=lowpass, start=first, end=last)
+    tables = {"bodies.sto": recorded.bodies(), "markers.sto": recorded.markers()}
+    written(recorded, tables, options.results_folder(file, output), trc=trc)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass, field
 from osimlite.schema.model import Model
-from osimlite.simulation.tabular import Tabular
+from osimlite.simulation.movement import Movement
 
 ADVICE = 0.02, 0.04
 """What OpenSim's documentation calls good: a root mean square of the marker errors of less than 2 cm, and a largest one
@@ -19,7 +18,7 @@ of less than 4 cm (m)."""
 
 
 @dataclass(frozen=True, eq=False)
-class FittedMotion(Tabular):
+class FittedMotion(Movement):
     """A motion of a model that fits measured markers and orientations.
 
     Attributes:
@@ -53,11 +52,6 @@ class FittedMotion(Tabular):
     turns: Array = field(default_factory=lambda: np.empty((0, 0, 3)))
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates, in the mechanism's order."""
-        return self.mechanism.coordinate_names
-
-    @property
     def marker_errors(self) -> Array:
         """How far each marker is from where it was measured (t, m), m; NaN where it was not seen."""
         return np.asarray(np.linalg.norm(self.places - self.measured, axis=2))
@@ -67,11 +61,6 @@ class FittedMotion(Tabular):
         """The angle of each sensor from where it was measured (t, k), rad; NaN where it was not."""
         return np.asarray(np.linalg.norm(self.turns, axis=2))
 
-    @property
-    def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
-        """The coordinates over ``time``, rad and m."""
-        return {"time": self.times}, dict(zip(self.coordinates, self.values.T, strict=True))
-
     def to_xarray(self) -> Any:
         """An xarray Dataset: ``value`` over ``time`` and ``coordinate``, ``marker_error`` over ``time`` and ``marker``.
 
@@ -80,25 +69,12 @@ class FittedMotion(Tabular):
         Raises:
             MissingDependency: xarray is not installed.
         """
-        from osimlite._require import require
-
-        xarray = require("xarray", extra="frame", purpose="a data set of xarray")
         errors: dict[str, Any] = {"marker_error": (("time", "marker"), self.marker_errors)}
-        names = {"coordinate": list(self.coordinates), "marker": list(self.markers)}
+        names = {"marker": list(self.markers)}
         if self.sensors:
             errors["orientation_error"] = ("time", "sensor"), self.orientation_errors
             names["sensor"] = list(self.sensors)
-        return xarray.Dataset(
-            {"value": (("time", "coordinate"), self.values), **errors},
-            {"time": self.times, **names},
-            {"model": self.mechanism.name},
-        )
-
-    @property
-    def in_degrees(self) -> Array:
-        """The values (t, n) with rotational coordinates in degrees, as OpenSim's files have them."""
-        turning = [info.motion_type == "rotational" for info in self.mechanism.coordinates]
-        return np.where(turning, np.rad2deg(self.values), self.values)
+        return super().to_xarray().assign(errors).assign_coords(names)
 
     @property
     def summary(self) -> dict[str, Any]:

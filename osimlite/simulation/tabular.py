@@ -35,3 +35,12 @@ class Tabular(ABC):
         """
         rows, columns = self.table
         return require("pyarrow", extra="frame", purpose="an Arrow table").table({**rows, **columns})
+
+    def to_xarray(self) -> Any:
+        """The `table` as an xarray Dataset over what tells the rows apart.
+
+        Raises:
+            MissingDependency: xarray or pandas is not installed.
+        """
+        require("xarray", extra="frame", purpose="a data set of xarray")
+        return self.to_frame().to_xarray()

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from osimlite.errors import DocumentError, OsimliteError
+from osimlite.errors import OsimliteError
 from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
@@ -77,8 +77,6 @@ def read_recording(
         OsimliteError: a file is missing or no motion; see :meth:`.RecordedMotion.read`.
     """
     recorded = RecordedMotion.read(mechanism, path)
-    if not len(recorded.times):
-        raise DocumentError("the motion has no rows", file=str(path))
     rows = recorded.values
     for name, value in (values or {}).items():
         rows[:, mechanism.coordinate_index(name)] = value

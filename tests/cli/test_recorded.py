@@ -122,3 +122,35 @@ def test_markers_as_trc(fixtures: Path, tmp_path: Path) -> None:
     assert lines[0] == "PathFileType\t4\t(X/Y/Z)\tmarkers.trc"
     assert lines[2].split("\t")[:4] == ["2", "2", "2", "0"]
     assert "markers.trc" in done.out
+
+
+def test_loads_without_a_document(fixtures: Path, tmp_path: Path) -> None:
+    """What its columns push is said beside the table; a part of the motion is enough."""
+    walker = str(fixtures / "walker" / "DynamicWalkerModel.osim")
+    times = [0.01 * k for k in range(20)]
+    write_sto(tmp_path / "still.mot", "still", times, ("Pelvis_tx",), [[0.1] for _ in times])
+    write_sto(tmp_path / "push.sto", "push", [0.0, 1.0], ("f_x", "f_y", "f_z"), [[0.0, 7.0, 0.0]] * 2)
+    (tmp_path / "loads.xml").write_text(LOADS.format(body="Pelvis"))
+    lifted = []
+    for words in (("loads.xml",), ("push.sto", "--applied-to", "Pelvis=f_")):
+        done = run(
+            "inverse-dynamics", walker, "still.mot", "--from", "0.05", "--until", "0.1", "-o", "out",
+            "--external-loads", *words, folder=tmp_path,
+        )  # fmt: skip
+        assert (done.code, done.err) == (0, "")
+        lifted.append((tmp_path / "out" / "inverse_dynamics.sto").read_text())
+    assert lifted[0] == lifted[1]
+    assert read_sto(tmp_path / "out" / "inverse_dynamics.sto").times == pytest.approx(times[5:11])
+    wrong: list[tuple[tuple[str, ...], str]] = [
+        (("--external-loads", "push.sto"), "push.sto: this is a table, which does not say what its forces push"),
+        (("--applied-to", "Pelvis=f_"), "name the table as external_loads"),
+        (("--external-loads", "push.sto", "--applied-to", "Pelvic=f_"), "did you mean 'Pelvis'?"),
+        (("--external-loads", "push.sto", "--applied-to", "Pelvis=g_"), "no column of 'push.sto' begins so"),
+        (("--external-loads", "push.sto", "--applied-to", "Pelvis"), "--applied-to takes BODY=FORCE,POINT,MOMENT"),
+        (("--from", "3"), "no time of the motion lies between 3 and inf s"),
+    ]
+    for more, said in wrong:
+        done = run("inverse-dynamics", walker, "still.mot", *more, folder=tmp_path)
+        assert done.code == 2 and said in done.err, done.err
+    done = run("kinematics", walker, "still.mot", "--from", "0.05", "--until", "0.1", "-o", "out", folder=tmp_path)
+    assert done.code == 0 and "6 times from 0.05 s to 0.1 s" in done.out

@@ -6,14 +6,14 @@ a constant if there is one. Before the first time and after the last, a spline g
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from osimlite.document.part import read_object
-from osimlite.errors import DocumentError, ModelError
+from osimlite.errors import DocumentError, ModelError, SettingError
 from osimlite.multibody.functions import Constant, Function, PiecewiseLinear
 from osimlite.multibody.mechanism import FramePlacement, Mechanism
 from osimlite.multibody.smoothing_spline import natural_splines
@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from osimlite.simulation.elements.gather import ElementBuilder
 
 Functions = tuple[Function, Function, Function]
+TABLES = (".mot", ".sto", ENDING)
+"""How files of forces over time end."""
+PARTS = ("force", "point", "torque")
+"""What columns of a load may give."""
 
 
 def external_load(path: str, name: str, load: Load) -> DeclaredForce:
@@ -36,8 +40,37 @@ def external_load(path: str, name: str, load: Load) -> DeclaredForce:
     return DeclaredForce(ExternalForce, path, name, load, ())
 
 
-def read_external_loads(mechanism: Mechanism, path: str | Path) -> tuple[DeclaredForce, ...]:
+def pushing(table: str | Path, applied_to: Mapping[str, Sequence[Sequence[str]]]) -> ExternalLoads:
+    """The loads of a table without a document.
+
+    Args:
+        table: a .mot, .sto or .c3d file, in the axes of ground.
+        applied_to: by the names of bodies, for each load on one what the labels of its force, point and moment begin
+            with; the last one or two may be left out. Without a point it acts at the origin of the body.
+
+    Raises:
+        SettingError: it is no such file, or a load has none of these, or more.
+    """
+    if Path(table).suffix.lower() not in TABLES:
+        raise SettingError(f"'{table}' is no table of forces ({', '.join(TABLES)}), whose columns could push bodies")
+    loads = ExternalLoads(name="loads", datafile=str(table))
+    for body, several in applied_to.items():
+        for number, names in enumerate(several, start=1):
+            if not 1 <= len(names) <= len(PARTS) or not names[0]:
+                told = f"the load on '{body}' is {list(names)}; name what the labels of its force begin with"
+                raise SettingError(f"{told}, then of its point, then of its moment")
+            identifiers: Any = {f"{part}_identifier": text for part, text in zip(PARTS, names, strict=False)}
+            name = body.rpartition("/")[2] + (f"_{number}" if len(several) > 1 else "")
+            loads.objects.append(ExternalForce(name=name, applied_to_body=body, **identifiers))
+    return loads
+
+
+def read_external_loads(mechanism: Mechanism, source: str | Path | ExternalLoads) -> tuple[DeclaredForce, ...]:
     """The loads of a document of ExternalLoads, those whose `appliesForce` is false left out.
+
+    Args:
+        mechanism: that they push.
+        source: the document, or its file.
 
     Its data file is looked for beside it, then from the folder that the program runs in.
 
@@ -45,8 +78,14 @@ def read_external_loads(mechanism: Mechanism, path: str | Path) -> tuple[Declare
         DocumentError: a file is missing, or holds something else; the mechanism has no body of a name, or the data file
             no three columns for an identifier.
     """
-    loads, file = read_object(path, ExternalLoads), str(path)
-    columns = _Columns(loads_table(loads, Path(path).parent, file))
+    if isinstance(source, ExternalLoads):
+        loads, folder, file = source, Path(), None
+    elif Path(source).suffix.lower() in TABLES:
+        told = "this is a table, which does not say what its forces push: name it in a document of ExternalLoads"
+        raise DocumentError(f"{told}, or say so to inverse-dynamics by --applied-to", file=str(source))
+    else:
+        loads, folder, file = read_object(source, ExternalLoads), Path(source).parent, str(source)
+    columns = _Columns(loads_table(loads, folder, file))
     forces = (force for force in loads.objects if force.appliesForce)
     return tuple(
         external_load(f"/componentset/{loads.name}/{force.name}", force.name, _load(mechanism, force, columns, file))
@@ -67,7 +106,7 @@ def load_in_model(builder: ElementBuilder, force: ExternalForce) -> Load:
     return _load(builder.mechanism, force, columns, builder.path(loads))
 
 
-def loads_table(loads: ExternalLoads, folder: Path, file: str) -> StoTable:
+def loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> StoTable:
     """The data of some loads, looked for in a folder first.
 
     Raises:
@@ -80,8 +119,8 @@ def loads_table(loads: ExternalLoads, folder: Path, file: str) -> StoTable:
     return read_c3d_forces(path) if path.suffix.lower() == ENDING else read_sto(path)
 
 
-def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: str) -> Load:
-    identifiers = {what: (getattr(force, f"{what}_identifier") or "").strip() for what in ("force", "point", "torque")}
+def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: str | None) -> Load:
+    identifiers = {what: (getattr(force, f"{what}_identifier") or "").strip() for what in PARTS}
     given = {
         what: columns.three(identifier, f"the {what}_identifier of '{force.name}'", file)
         for what, identifier in identifiers.items()
@@ -107,7 +146,7 @@ def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: s
     )
 
 
-def _place(mechanism: Mechanism, value: Any, what: str, file: str) -> FramePlacement:
+def _place(mechanism: Mechanism, value: Any, what: str, file: str | None) -> FramePlacement:
     """The frame of a path or the name of a body."""
     name = value if isinstance(value, str) else value.name
     try:
@@ -129,7 +168,7 @@ class _Columns:
             raise DocumentError("the table has no rows", file=table.file)
         self._made: dict[str, Functions] = {}
 
-    def three(self, identifier: str, what: str, file: str) -> Functions:
+    def three(self, identifier: str, what: str, file: str | None) -> Functions:
         """The functions of the three columns whose labels begin with an identifier."""
         if identifier not in self._made:
             labels = self.table.columns

@@ -26,6 +26,7 @@ from osimlite.text import listed, or_known
 
 if TYPE_CHECKING:
     from osimlite.meshes.folders import MeshFolders
+    from osimlite.schema.prescribed import ExternalLoads
     from osimlite.simulation.elements.items import ForceElement
 
 C = TypeVar("C")
@@ -57,7 +58,7 @@ def force_elements(
     simbody_early_return: bool = False,
     own_activation_times: bool = False,
     wrapping: str = OPENSIM,
-    external_loads: str | Path | None = None,
+    external_loads: str | Path | ExternalLoads | None = None,
     folder: str | Path | None = None,
 ) -> Forces:
     """Gather the forces of a model.
@@ -71,7 +72,7 @@ def force_elements(
         simbody_early_return: reproduce Simbody's defect in contact of several surfaces.
         own_activation_times: do not reproduce OpenSim's defect in the activation of several DeGrooteFregly2016Muscles.
         wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
-        external_loads: a file of ExternalLoads, which follow the forces of the model.
+        external_loads: measured loads or their file, which follow the forces of the model.
         folder: where the model's file is, and the files that it names; the folder that the program runs in if None.
 
     Raises:

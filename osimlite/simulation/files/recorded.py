@@ -5,11 +5,13 @@ The quantities, their names and their order are those of OpenSim's BodyKinematic
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from osimlite.errors import DocumentError, ModelError, SettingError
 from osimlite.multibody.dynamics import MassCentres
@@ -23,9 +25,13 @@ from osimlite.schema.tree import is_a
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.simulation.lowpass import lowpassed
+from osimlite.simulation.movement import Movement
 from osimlite.simulation.start import columns_of_states
 from osimlite.simulation.system import System
 from osimlite.text import counted, did_you_mean, listed
+
+if TYPE_CHECKING:
+    from osimlite.simulation.trajectory import Trajectory
 
 LARGEST = 1e25
 """No coordinate (rad or m) is larger: what follows of such numbers is none."""
@@ -37,10 +43,16 @@ KINDS = {"all": "Force", "actuators": "Actuator", "muscles": "Muscle"}
 
 
 def exclude_forces(model: Model, names: Iterable[str]) -> None:
-    """Switch forces of a model off, as OpenSim's tools do with `forces_to_exclude`.
+    """Switch forces of a model off, as OpenSim's tools do with `forces_to_exclude`; as `excluded_forces`."""
+    for force in excluded_forces(model, names):
+        force.appliesForce = False
+
+
+def excluded_forces(model: Model, names: Iterable[str]) -> list[Force]:
+    """The forces that OpenSim's tools switch off by `forces_to_exclude`.
 
     Args:
-        model: is changed.
+        model: whose forces.
         names: of forces or of groups of them; "All", "Actuators" or "Muscles".
 
     Raises:
@@ -48,6 +60,7 @@ def exclude_forces(model: Model, names: Iterable[str]) -> None:
     """
     forces = {force.name: force for force in model.components(Force)}
     groups = {group.name: group.members for group in model.force_set.groups}
+    found: list[Force] = []
     for name in names:
         kind = KINDS.get(name.lower())
         members = [force for force in forces.values() if is_a(force, kind)] if kind else []
@@ -57,13 +70,15 @@ def exclude_forces(model: Model, names: Iterable[str]) -> None:
                 raise SettingError(f"'{model.name}' has no force and no group of forces '{name}'{near}")
             named = [str(getattr(member, "name", member)) for member in groups.get(name, (name,))]
             members = [forces[member] for member in named if member in forces]
-        for force in members:
-            force.appliesForce = False
+        found += members
+    return found
 
 
 @dataclass(frozen=True, eq=False)
-class RecordedMotion:
+class RecordedMotion(Movement):
     """Values of all coordinates of a mechanism at t times.
+
+    As a table it is these values; :meth:`bodies`, :meth:`markers` and :meth:`inverse_dynamics` are others.
 
     Attributes:
         mechanism: whose coordinates they are.
@@ -82,6 +97,38 @@ class RecordedMotion:
     around: tuple[Array, Array] | None = None
 
     @classmethod
+    def of(cls, mechanism: Mechanism, source: Recorded, times: ArrayLike | None = None) -> RecordedMotion:
+        """A motion from a file, from arrays, or one that was found, which may be of another model.
+
+        Args:
+            mechanism: that follows it.
+            source: a .mot or .sto file; a motion, such as a fitted one or a trajectory; or arrays (t,) in rad and m by
+                the names or paths of coordinates.
+            times: of arrays (t,), s.
+
+        Raises:
+            SettingError: the arrays are not as many numbers as there are times, or these are not given.
+            OsimliteError: it is no motion; as of `read`.
+        """
+        if isinstance(source, str | Path):
+            return cls.read(mechanism, source)
+        if isinstance(source, Mapping):
+            if times is None:
+                raise SettingError("arrays of coordinates have no times of their own; give times")
+            moments = np.asarray(times, dtype=float).reshape(-1)
+            columns = [np.asarray(column, dtype=float) for column in source.values()]
+            for name, column in zip(source, columns, strict=True):
+                if column.shape != moments.shape:
+                    had = " × ".join(map(str, column.shape)) or "one"
+                    raise SettingError(f"'{name}' has {had} values for {counted(len(moments), 'time')}; give one each")
+            rows = np.column_stack([np.empty((len(moments), 0)), *columns])
+            return cls._of_table(mechanism, StoTable("arrays", moments, tuple(source), rows))
+        found = source.mechanism.coordinates
+        return cls._of_table(
+            mechanism, StoTable("motion", source.times, tuple(info.path for info in found), source.values)
+        )
+
+    @classmethod
     def read(cls, mechanism: Mechanism, path: str | Path) -> RecordedMotion:
         """The motion in a .mot or .sto file.
 
@@ -90,11 +137,16 @@ class RecordedMotion:
         converted, coupled ones are not, as in OpenSim.
 
         Raises:
-            DocumentError: it is not a storage file, its times do not increase, a coordinate is no number, or no column
-                names one of the mechanism.
+            DocumentError: it is not a storage file, has no rows, its times do not increase, a coordinate is no number,
+                or no column names one of the mechanism.
             ModelError: the mechanism has no coordinates.
         """
-        table = read_sto(path)
+        return cls._of_table(mechanism, read_sto(path))
+
+    @classmethod
+    def _of_table(cls, mechanism: Mechanism, table: StoTable) -> RecordedMotion:
+        if not len(table.times):
+            raise DocumentError("the motion has no rows", file=table.file)
         values = np.tile(mechanism.values({}), (len(table.times), 1))
         places = {label: place for place, label in reversed([*enumerate(table.columns)])}
         states = columns_of_states(
@@ -116,18 +168,18 @@ class RecordedMotion:
             if place not in used and not label.startswith("/forceset/")
         ]
         if not mechanism.coordinates:
-            raise ModelError(f"'{mechanism.name}' has no coordinates: it cannot follow a motion", file=str(path))
+            raise ModelError(f"'{mechanism.name}' has no coordinates: it cannot follow a motion", file=table.file)
         if not found:
             raise DocumentError(
                 f"no column is a coordinate of '{mechanism.name}'; its coordinates are "
                 f"{listed(mechanism.coordinate_names)}",
-                file=str(path),
+                file=table.file,
             )
         late = np.flatnonzero(np.diff(table.times) <= 0.0)
         if len(late):
             raise DocumentError(
                 f"the time {table.times[late[0] + 1]:g} does not come after {table.times[late[0]]:g}; sort the rows",
-                file=str(path),
+                file=table.file,
             )
         gaps = np.argwhere(~(np.abs(values) < LARGEST))
         if len(gaps):
@@ -135,7 +187,7 @@ class RecordedMotion:
             name = mechanism.coordinates[place].name
             told = f"'{name}' is {values[row, place]} at {table.times[row]:g} s; "
             told += "fill the gaps" if not np.isfinite(values[row, place]) else "no body goes so far"
-            raise DocumentError(told, file=str(path))
+            raise DocumentError(told, file=table.file)
         missing = tuple(info.name for place, info in enumerate(mechanism.coordinates) if place not in found)
         return cls(mechanism, table.times, values, missing, tuple(ignored))
 
@@ -251,3 +303,7 @@ class RecordedMotion:
         infos = [mechanism.coordinates[place] for place in order]
         labels = [f"{info.name}_{'moment' if info.motion_type == 'rotational' else 'force'}" for info in infos]
         return StoTable("Inverse Dynamics Generalized Forces", self.times, tuple(labels), rows[:, order])
+
+
+Recorded: TypeAlias = "str | Path | Mapping[str, ArrayLike] | Movement | Trajectory"
+"""A motion in any form."""

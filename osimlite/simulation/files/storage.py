@@ -5,7 +5,8 @@ from __future__ import annotations
 import shutil
 import tempfile
 from array import array
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,12 @@ from osimlite.files import written_atomically
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass, field
 from osimlite.simulation.files.table_stream import TableStream
+from osimlite.simulation.tabular import Tabular
 from osimlite.tables import suffixes
 
 
 @dataclass(frozen=True, eq=False)
-class StoTable:
+class StoTable(Tabular):
     """A table over time.
 
     Attributes:
@@ -47,6 +49,15 @@ class StoTable:
         if column not in self.columns:
             raise KeyError(column)
         return self.rows[:, self.columns.index(column)]
+
+    @property
+    def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
+        """The columns over ``time`` (s); of a label that is there again the second is called ``label.1``."""
+        columns, again = dict[str, Array](), Counter[str]()
+        for label, column in zip(self.columns, self.rows.T, strict=True):
+            columns[f"{label}.{again[label]}" if again[label] else label] = column
+            again[label] += 1
+        return {"time": self.times}, columns
 
 
 def sto_text(
