@@ -216,6 +216,34 @@ def millard2012_acceleration(
     )
 
 
+def millard2012_acceleration_rigid(
+    length: float,
+    rate: float,
+    excitation: float,
+    activation: float,
+    fiber_length: float,
+    fiber_velocity: float,
+    m: Millard2012Acceleration,
+    active_curve: Sequence[float],
+    velocity_curve: Sequence[float],
+    passive_curve: Sequence[float],
+    tendon_curve: Sequence[float],
+    short_curve: Sequence[float],
+    steep_curve: Sequence[float],
+) -> float:
+    """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim.
+
+    Args as of `millard2012_acceleration`; the states do not count.
+    """
+    fiber = fiber_length_along(length - m.slack, m.height, m.shortest, m.least_cos)
+    if not fiber > m.shortest:
+        return 0.0
+    cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
+    by_length, _ = curve_value(active_curve, fiber / m.optimal)
+    by_velocity, _ = curve_value(velocity_curve, rate * cos / (m.optimal * m.fastest))
+    return m.strength * by_length * by_velocity * cos
+
+
 def millard2012_acceleration_equilibrium(
     length: float,
     rate: float,

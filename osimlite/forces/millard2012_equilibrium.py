@@ -130,6 +130,36 @@ def millard2012_equilibrium(
     return tension, active, fiber, cos, by_length, by_velocity, pull, passive, is_found, change, speed, spring
 
 
+def millard2012_rigid(
+    length: float,
+    rate: float,
+    excitation: float,
+    activation: float,
+    fiber_length: float,
+    m: Millard2012Equilibrium,
+    active_curve: Sequence[float],
+    velocity_curve: Sequence[float],
+    inverse_curve: Sequence[float],
+    passive_curve: Sequence[float],
+    tendon_curve: Sequence[float],
+) -> float:
+    """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim.
+
+    As there, the pennation that takes the force to the tendon is that of fibers as many meters long as they have
+    optimal lengths: next to none.
+
+    Args as of `millard2012_equilibrium`; the states do not count.
+    """
+    fiber = fiber_length_along(length - m.slack, m.height, m.shortest, m.least_cos)
+    if fiber <= m.smallest:
+        return 0.0
+    cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
+    by_length, _ = curve_value(active_curve, fiber / m.optimal)
+    by_velocity, _ = curve_value(velocity_curve, rate * cos / (m.optimal * m.fastest))
+    taken = cos_pennation(fiber / m.optimal, m.height, m.shortest, m.largest_sin, m.least_cos)
+    return m.strength * by_length * by_velocity * taken
+
+
 def damped_velocity(
     m: Millard2012Equilibrium,
     active: float,

@@ -32,12 +32,14 @@ class OldMuscle(NamedTuple):
         strength: max_isometric_force, N.
         optimal: optimal_fiber_length, m.
         slack: tendon_slack_length, m.
+        fastest: max_contraction_velocity, 1/s.
         height: of the fibers, optimal sin(pennation_angle_at_optimal), m.
     """
 
     strength: float
     optimal: float
     slack: float
+    fastest: float
     height: float
 
 
@@ -83,6 +85,13 @@ def rigid_cos(path_length: float, m: OldMuscle) -> float:
     """
     along = path_length / m.optimal - m.slack
     return cos_upright(sqrt(along * along + m.height * m.height), m.height)
+
+
+def generic_velocity_factor(rate: float, m: OldMuscle) -> float:
+    """What OpenSim multiplies isometric forces of any of these muscles by, for a rate (m/s) of the path."""
+    sin = m.height / m.optimal
+    velocity = -sqrt(1.0 - sin * sin) * rate / (m.fastest * m.optimal)
+    return 1.8 - 1.8 / (1.0 + exp((0.04 - velocity) / 0.18))
 
 
 def schutte_passive_force(length: float) -> float:

@@ -192,6 +192,30 @@ def degroote(
     return tension, a, *fibers, activation_rate, force_rate, velocity * fastest, spring, energy
 
 
+def degroote_rigid(
+    length: float,
+    rate: float,
+    excitation: float,
+    activation: float,
+    normalized_tendon_force: float,
+    m: SmoothMuscle,
+    tendon: SmoothTendon,
+) -> float:
+    """Force (N) of fully active fibers with a rigid tendon, along the fibers as OpenSim has it.
+
+    Args as of `degroote`; the states do not count.
+    """
+    fiber_length, velocity = rigid_fibers(length, rate, m)
+    return m.strength * degroote_active(fiber_length, m.scale) * degroote_factor(velocity)
+
+
+def rigid_fibers(length: float, rate: float, m: SmoothMuscle) -> tuple[float, float]:
+    """Normalized length and velocity of fibers whose tendon keeps its slack length."""
+    along = length - m.slack
+    fiber_length = sqrt(along * along + m.height * m.height)
+    return fiber_length / m.optimal, rate * (along / fiber_length) / (m.fastest * m.optimal)
+
+
 def degroote_equilibrium(
     length: float,
     rate: float,
@@ -273,3 +297,9 @@ def meyer(
     activation_rate = smooth_activation_rate(excitation, a, m.rising, m.falling, m.sharpness)
     fibers = fiber_length, cos, active, factor, active_force, passive_force
     return tension, a, *fibers, activation_rate, rate * cos, m.strength * passive
+
+
+def meyer_rigid(length: float, rate: float, excitation: float, activation: float, m: SmoothMuscle) -> float:
+    """Force (N) of fully active fibers; as `degroote_rigid`."""
+    fiber_length, velocity = rigid_fibers(length, rate, m)
+    return m.strength * meyer_active(fiber_length, m.scale) * meyer_factor(velocity)

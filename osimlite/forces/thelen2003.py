@@ -15,6 +15,8 @@ TOE_SHAPE, TOE_FORCE = 3.0, 0.33
 """Of the tendon: the exponent at the end of its toe, and the force there."""
 ROUNDS, INVERSE_ROUNDS = 20, 100
 """Newton's steps in the search for an equilibrium, and in that for a force at a velocity."""
+ENOUGH = 1e-6
+"""What the velocity may be off where the tendon is taken for rigid, as in OpenSim."""
 SMALLEST = 2.0**-26
 """Least part of a step, and the step (m) in the other direction where there is none."""
 
@@ -172,17 +174,22 @@ def fiber_velocity(m: Thelen2003, force: float, activation: float, isometric: fl
     return velocity + slope * (force - at), slope
 
 
-def force_at_velocity(m: Thelen2003, velocity: float, activation: float, isometric: float) -> float:
+def force_at_velocity(m: Thelen2003, velocity: float, activation: float, isometric: float, enough: float) -> float:
     """What `fiber_velocity` inverts, over the force at rest; not a number if Newton's method does not end.
 
-    The velocity is met to the tolerance of an equilibrium, which is a force.
+    Args:
+        m: the muscle.
+        velocity: of the fibers, normalized.
+        activation: within its bounds.
+        isometric: what they bear at rest.
+        enough: what the velocity may be off.
     """
     force = isometric
     for _ in range(INVERSE_ROUNDS):
         found, slope = fiber_velocity(m, force, activation, isometric)
         if abs(slope) > SIGNIFICANT:
             force -= (found - velocity) / slope
-        if abs(found - velocity) < tolerance(m):
+        if abs(found - velocity) < enough:
             return max(0.0, force / isometric)
     return nan
 
@@ -230,6 +237,22 @@ def thelen2003(
         first_order_activation_rate(excitation, activation, m.rising, m.falling, m.least),
         velocity * m.fastest * m.optimal,
     )
+
+
+def thelen2003_rigid(
+    length: float, rate: float, excitation: float, activation: float, fiber_length: float, m: Thelen2003
+) -> float:
+    """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim.
+
+    Args as of `thelen2003`; the states do not count.
+    """
+    fiber = fiber_length_along(length - m.slack, m.height, m.shortest, m.least_cos)
+    if not fiber > m.shortest:
+        return 0.0
+    cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
+    isometric, _ = active_force(fiber / m.optimal, m.width)
+    factor = force_at_velocity(m, rate * cos / (m.optimal * m.fastest), 1.0, isometric, ENOUGH)
+    return m.strength * isometric * factor * cos
 
 
 def thelen2003_energy(m: Thelen2003, length: float, fiber_length: float, cos: float) -> float:
@@ -330,4 +353,4 @@ def shared(m: Thelen2003, fibers: Fibers, activation: float, rate: float, stiffn
     if fibers.is_taut and abs(along + of_tendon) > SIGNIFICANT:
         of_rate = along / (along + of_tendon) * rate
     velocity = (rate - of_rate) * fibers.cos / (m.fastest * m.optimal)
-    return force_at_velocity(m, velocity, activation, activation * fibers.active)
+    return force_at_velocity(m, velocity, activation, activation * fibers.active, tolerance(m))

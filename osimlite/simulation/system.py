@@ -21,6 +21,7 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.items import CONTROLS, ForceElement
+from osimlite.simulation.elements.muscle import STRENGTH
 from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.engines.linking import Code, Program, best
 from osimlite.simulation.kernels import layout
@@ -304,6 +305,39 @@ class System:
         if status != layout.OK:
             raise self.refusal(status, float(self._w[layout.TIME]), self._y.tolist())
         return found
+
+    def pushed(self, moments: Floats, udot: Floats, names: Sequence[str]) -> tuple[Floats, Floats, Floats]:
+        """What accelerations need while no actuator pushes, and what each actuator pushes by a control of 1.
+
+        What an actuator pushes must be proportional to its control, and the controls of all be 0.
+
+        Args:
+            moments: time (s) and state (k, 1 + y).
+            udot: accelerations (k, n) in the order of the state.
+            names: paths of a actuators.
+
+        Returns:
+            Generalized forces that are missing (k, n), those of each actuator (k, a, n), and the forces (N) of muscles
+            (k, a), 1 of other actuators. Constraints are left aside. Errors are those of :meth:`looked`.
+        """
+        code, size = self.program.code, len(self.order)
+        code.make_ready(("push_each", "inverse"))
+        items = {self.forces.elements[owner].path: place for place, owner in self._owners.items()}
+        controls = dict(zip(self._controls.names, self.places_of_controls, strict=True))
+        order = [len(moments), len(names)]
+        for name in names:
+            item, path, strength = items[name], -1, -1
+            if self.knows(name, STRENGTH):
+                path = item - int(self.structure[item + layout.OWN + self._kind_at(name).text.heads])
+                (strength,) = self.places_of(name, (STRENGTH,))
+            order += item, controls[name], path, strength
+        given, found = np.hstack([moments, udot]), np.empty((len(moments), size + len(names) * (size + 1)))
+        parts = self.program.ints, self.numbers, self._w, self._y, self._f, code.address("inverse")
+        status = self._run(code.entry("push_each"), *parts, given, np.array(order, dtype=np.int64), found)
+        if status != layout.OK:
+            raise self.refusal(status, float(self._w[layout.TIME]), self._y.tolist())
+        each = found[:, size:].reshape(len(moments), len(names), size + 1)
+        return found[:, :size], each[:, :, :size], each[:, :, size]
 
     @cached_property
     def _records_at(self) -> dict[str, int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from osimlite.simulation.run import Simulation
 from osimlite.simulation.start import columns_of_states
 from osimlite.text import listed
 from osimlite.tools.job import Job
-from osimlite.tools.motion import Motion
+from osimlite.tools.motion import Motion, Record
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.through_time import StateRows, analyse, analyses_of, simulation_of, tell_rows, told_model
 
@@ -34,27 +34,27 @@ def run(job: Job, outcome: Outcome) -> None:
     model = told_model(job)
     with simulation_of(job, model) as simulation:
         if states is None:
-            first, rows = _followed(job, outcome, simulation, model)
+            first, rows, record = _followed(job, outcome, simulation, model)
         else:
             given = StateRows.read(job, states, simulation)
             given.tell(outcome)
             first, last = given.row(setup.initial_time), given.row(setup.final_time)
-            table = given.table
+            table, record = given.table, lambda: (given.table.times, given.speeds(simulation))
             rows = ((float(table.times[k]), given.state(simulation, k)) for k in range(first, last + 1))
         equilibrate, engine = setup.solve_for_equilibrium_for_auxiliary_states, simulation.engine
         kept = [(t, engine.equilibrated(t, y) if equilibrate else y) for t, y in rows]
         if not kept:
             raise job.error(f"there is nothing from {setup.initial_time:g} s to {setup.final_time:g} s")
         times, found = zip(*kept, strict=True)
-        motion = Motion(model, simulation, np.array(times), np.array(found))
+        motion = Motion(model, simulation, np.array(times), np.array(found), record=record)
         analyse(job, outcome, analyses, motion, first)
     tell_rows(job, outcome, motion)
 
 
 def _followed(
     job: Job, outcome: Outcome, simulation: Simulation, model: Model
-) -> tuple[int, Iterator[tuple[float, list[float]]]]:
-    """The number of the first row, and times and states from the coordinates of a setup."""
+) -> tuple[int, Iterator[tuple[float, list[float]]], Callable[[], Record]]:
+    """The number of the first row, times and states from the coordinates of a setup, and the record of all speeds."""
     setup: AnalyzeTool = job.setup
     mechanism = simulation.mechanism
     recorded = RecordedMotion.read(mechanism, job.needed("coordinates_file"))
@@ -66,11 +66,14 @@ def _followed(
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:
         recorded = recorded.lowpassed(cutoff, continued=True)
-    before = recorded.times
+    before = recorded
     recorded = recorded.between(setup.initial_time, setup.final_time)
     # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints change the values.
     given = job.path("speeds_file")
-    speeds = recorded.rates[0] if given is None else _given(job, given, recorded)
+    if given is None:
+        speeds = recorded.rates[0]
+    else:
+        own, speeds = _given(job, given, recorded)
     if simulation.constraints:
         recorded = recorded.assembled()
         if not model.constraint_set.objects:
@@ -78,12 +81,13 @@ def _followed(
             moments = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
             speeds = np.array([mechanism.project_speeds(q, u, time) for time, q, u in moments])
     rows = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
-    first = int(np.searchsorted(before, recorded.times[0]))
-    return first, ((t, simulation.state.pack(q.tolist(), u.tolist())) for t, q, u in rows)
+    states = ((t, simulation.state.pack(q.tolist(), u.tolist())) for t, q, u in rows)
+    first = int(np.searchsorted(before.times, recorded.times[0]))
+    return first, states, lambda: (before.times, before.rates[0]) if given is None else own
 
 
-def _given(job: Job, path: Path, recorded: RecordedMotion) -> Array:
-    """The speeds (t, n) of a file at the times of a motion; those without a column are zero.
+def _given(job: Job, path: Path, recorded: RecordedMotion) -> tuple[Record, Array]:
+    """Times and speeds of a file, and its speeds (t, n) at the times of a motion; those without a column are zero.
 
     Raises:
         DocumentError: the file has no speeds, or lacks a time.
@@ -93,11 +97,11 @@ def _given(job: Job, path: Path, recorded: RecordedMotion) -> Array:
     columns = columns_of_states(table.columns, paths)
     if not columns:
         raise job.error(f"'{path}' has no column with a speed of the model")
-    speeds = np.zeros_like(recorded.values)
+    speeds = np.zeros((len(table.times), len(infos)))
     rows = np.searchsorted(table.times, recorded.times - SAME_TIME)
     for row, time in zip(rows.tolist(), recorded.times.tolist(), strict=True):
         if row == len(table.times) or abs(table.times[row] - time) > SAME_TIME:
             raise job.error(f"'{path}' has no row at {time:.15g} s, at which there are coordinates; give it one")
     for name, place in columns.items():
-        speeds[:, paths.index(name)] = table.rows[rows, place]
-    return speeds
+        speeds[:, paths.index(name)] = table.rows[:, place]
+    return (table.times, speeds), speeds[rows]

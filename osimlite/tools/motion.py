@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from osimlite.errors import SettingError
+from osimlite.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.schema.model import Model
@@ -20,9 +22,15 @@ from osimlite.simulation.probed import Moment
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
 from osimlite.tables import suffixes
-from osimlite.text import did_you_mean
+from osimlite.text import counted, did_you_mean
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
+
+Record = tuple[Array, Array]
+"""Times (r,) and generalized speeds (r, n)."""
+
+LEAST_TIMES = 6
+"""That splines of fifth degree go through."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +43,7 @@ class Motion:
         times: (t,), s.
         states: (t, y), in the order of the simulation's engine.
         steps: the start and the ends of all steps, if the motion was integrated.
+        record: gives what was measured, of which the motion is a part.
     """
 
     model: Model
@@ -42,6 +51,7 @@ class Motion:
     times: Array
     states: Array
     steps: Sequence[Moment] = ()
+    record: Callable[[], Record] | None = None
 
     @cached_property
     def _found(self) -> dict[str, Any]:
@@ -115,6 +125,21 @@ class Motion:
         return found
 
     @cached_property
+    def wanted(self) -> Array:
+        """Derivatives of the speeds (t, n) that were measured, by natural splines of fifth degree through all of them.
+
+        Raises:
+            SettingError: fewer than six times were measured.
+        """
+        assert self.record is not None
+        times, speeds = self.record()
+        if len(times) < LEAST_TIMES:
+            told = f"the motion has {counted(len(times), 'time')}; accelerations need at least {LEAST_TIMES}"
+            raise SettingError(told)
+        (found,) = derivatives_of_samples(times, speeds, self.times, (1,), LEAST_TIMES // 2)
+        return found
+
+    @cached_property
     def links(self) -> LinkMotion:
         """Where the bodies are and how they move at every time."""
         system = System(self.mechanism.released(), Forces(()))
@@ -180,10 +205,8 @@ class Tables:
             description: what the header says besides.
             of: what stands before the suffix in the file's name, if not the analysis alone.
         """
-        setup = self.job.setup
-        path = self.job.in_results(f"{setup.name}_{self.name}{of}_{suffix}")
         table = StoTable(title, self.times, tuple(columns), rows, in_degrees)
-        self.outcome.table(path, table, description, setup.output_precision)
+        self.outcome.table(self._path(f"{of}_{suffix}"), table, description, self.job.setup.output_precision)
 
     def add_newer(self, suffix: str, columns: Sequence[str], rows: Array, kind: str) -> None:
         """Have a table written in the newer form of OpenSim's storage files, which is not named after the analysis.
@@ -197,3 +220,10 @@ class Tables:
         labels = tuple(f"{column}{end}" for column in columns for end in suffixes(kind))
         path = self.job.in_results(f"{self.job.setup.name}_{suffix}")
         self.outcome.new_table(path, StoTable("", self.times, labels, rows, kind=kind))
+
+    def add_text(self, suffix: str, content: str) -> None:
+        """Have a text written, whose file's name ends so."""
+        self.outcome.text(self._path(f"_{suffix}"), content)
+
+    def _path(self, ending: str) -> Path:
+        return self.job.in_results(f"{self.job.setup.name}_{self.name}{ending}")

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite._load import module_name
+from osimlite.multibody.spatial import Array
 from osimlite.records import replace
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Object
@@ -166,6 +167,14 @@ class StateRows(NamedTuple):
         for path in own:
             y[first + simulation.state.paths.index(path)] = given[path]
         return y
+
+    def speeds(self, simulation: Simulation) -> Array:
+        """The generalized speeds of all rows (t, n); what has no column is 0."""
+        found = np.zeros((len(self.table.times), len(simulation.mechanism.coordinates)))
+        for place, info in enumerate(simulation.mechanism.coordinates):
+            if (column := self.columns.get(f"{info.path}/speed")) is not None:
+                found[:, place] = self.table.rows[:, column]
+        return found
 
     def tell(self, outcome: Outcome) -> None:
         """Say which states were not in the file."""

@@ -94,10 +94,10 @@ def test_what_cannot_be_run_is_refused_by_name(setup: Path, tag: str) -> None:
 
 
 def test_an_analysis_that_cannot_be_computed_is_refused_before_anything_is_written(setup: Path) -> None:
-    analyses = "<AnalysisSet><objects><Kinematics name='K'/><StaticOptimization name='SO'/></objects></AnalysisSet>"
+    analyses = "<AnalysisSet><objects><Kinematics name='K'/><InducedAccelerations name='IA'/></objects></AnalysisSet>"
     text = SETUP.replace("InverseDynamicsTool", "AnalyzeTool")
     setup.write_text(text.replace("</coordinates_file>", f"</coordinates_file>{analyses}"))
-    with pytest.raises(NotRunnable, match="'SO' is a StaticOptimization"):
+    with pytest.raises(NotRunnable, match="'IA' is a InducedAccelerations"):
         osimlite.run(setup, check=False)
     assert not (setup.parent / "results").exists()
 

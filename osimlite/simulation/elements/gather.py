@@ -60,6 +60,7 @@ def force_elements(
     wrapping: str = OPENSIM,
     external_loads: str | Path | ExternalLoads | None = None,
     folder: str | Path | None = None,
+    rigid_tendons: bool = False,
 ) -> Forces:
     """Gather the forces of a model.
 
@@ -74,6 +75,7 @@ def force_elements(
         wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
         external_loads: measured loads or their file, which follow the forces of the model.
         folder: where the model's file is, and the files that it names; the folder that the program runs in if None.
+        rigid_tendons: muscles pull with their control times the force of fully active fibers along a rigid tendon.
 
     Raises:
         UnsupportedError: some forces cannot be computed; the message names them.
@@ -81,7 +83,7 @@ def force_elements(
         OsimliteError: a file that is named cannot be read.
     """
     builder = ElementBuilder(
-        model, mechanism, Path(folder or "."), simbody_early_return, own_activation_times, wrapping
+        model, mechanism, Path(folder or "."), simbody_early_return, own_activation_times, wrapping, rigid_tendons
     )
     elements: list[ForceElement] = []
     skipped: list[str] = []
@@ -132,6 +134,7 @@ class ElementBuilder:
         early_return: whether Simbody's defect in contact is reproduced.
         own_times: whether OpenSim's defect in activation is not.
         geodesic: whether paths bend around surfaces along geodesics.
+        rigid_tendons: whether muscles pull as if they had rigid tendons and no states.
 
     Raises:
         SettingError: there is no such wrapping.
@@ -145,6 +148,7 @@ class ElementBuilder:
         early_return: bool = False,
         own_times: bool = False,
         wrapping: str = OPENSIM,
+        rigid_tendons: bool = False,
     ) -> None:
         if wrapping not in WRAPPINGS:
             raise SettingError(f"there is no wrapping '{wrapping}'{or_known(wrapping, WRAPPINGS)}")
@@ -155,6 +159,7 @@ class ElementBuilder:
         self._of: dict[type, list[Any]] = {}
         self.drives: dict[str, list[Drive]] = {}
         self.early_return, self.own_times, self.geodesic = early_return, own_times, wrapping == GEODESIC
+        self.rigid_tendons = rigid_tendons
 
     @property
     def folder(self) -> Path:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from osimlite.records import dataclass
 from osimlite.simulation.kernels import layout, pointers
 from osimlite.simulation.kernels.condensation import WIDTH
-from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF, RESPONSE
+from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF, RESPONSE, RIGID
 
 if TYPE_CHECKING:
     from osimlite.simulation.elements.kind import Kind, State
@@ -56,6 +56,15 @@ class KernelText:
             if state.name in kind.settled:
                 lines += [f"if i[{place}] >= 0:", f"    y[i[{place}]] = {state.name}"]
         return self._function(EQUILIBRIUM, kind.equilibrium, lines)
+
+    @cached_property
+    def rigid_kernel(self) -> Callable[..., int]:
+        """The function of a muscle that pulls with its control times the force of fully active fibers."""
+        lines = [f"active_fiber_force = law({', '.join(self._arguments)})"]
+        lines += [f"activation = {self._arguments[len(self.kind.geometry.inputs)]}"]
+        lines += ["tension = activation * active_fiber_force"]
+        lines += self._noted(("tension", "activation", "active_fiber_force", *self.kind.geometry.inputs))
+        return self._function(RIGID, self.kind.rigid, [*lines, *self.kind.geometry.after])
 
     @cached_property
     def response_kernel(self) -> Callable[..., int]:

@@ -23,13 +23,14 @@ from osimlite._load import module_name
 from osimlite.records import dataclass, field
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.states import states_of
+from osimlite.schema.tree import is_a
 from osimlite.simulation.elements.gather import ElementBuilder, module_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places, Response, Silent
 from osimlite.simulation.elements.kernel_text import SOLVED, KernelText
 from osimlite.simulation.elements.parameters import Control, Fields, Number, Parameter, ReflexControl, Tail
 from osimlite.simulation.kernels import layout
-from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF, RESPONSE
+from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF, RESPONSE, RIGID
 from osimlite.simulation.states import StateVariable
 
 ENERGY = "energy"
@@ -84,6 +85,7 @@ class Kind:
         equilibrium: computes states in equilibrium from what the law is given: whether it found them, and those that
             `settled` names.
         settled: names of the states that it finds.
+        rigid: force (N) of fully active fibers along a rigid tendon, from what the law is given; of muscles.
         told: what is said of a force whose law, or equilibrium, has no solution, from what is `known` of it.
         labels: of the record, in which {name} stands for that of the force, each with its output; the geometry's own if
             None.
@@ -104,6 +106,7 @@ class Kind:
     states: tuple[State, ...] = ()
     equilibrium: Callable[..., Any] | None = None
     settled: tuple[str, ...] = ()
+    rigid: Callable[..., float] | None = None
     told: Callable[[Mapping[str, float]], str] | None = None
     labels: Mapping[str, str] | None = None
     stored: Callable[[DeclaredForce, Sequence[float]], float] | None = None
@@ -148,6 +151,10 @@ class Kind:
             return ForceOff(self.component, path, force.name, None, (), states)
         values = tuple(term.read(builder, force) for term in self.terms)
         made = DeclaredForce if force.appliesForce else ForceOff
+        if builder.rigid_tendons and is_a(force, "Muscle"):
+            if self.rigid is None:
+                raise builder.unsupported(force, " with a rigid tendon")
+            made = RigidTendon
         return made(self.component, path, force.name, self.geometry.read(builder, force), values, states)
 
     @cached_property
@@ -286,6 +293,13 @@ class ForceOff(Silent, DeclaredForce):
     def items(self, places: Places) -> list[Item]:
         """What the kernels compute."""
         return super().items(places) if self.kind.goes_on else []
+
+
+@dataclass(frozen=True)
+class RigidTendon(DeclaredForce):
+    """A muscle that pulls with its control times the force of fully active fibers along a rigid tendon."""
+
+    form = RIGID
 
 
 def kinds() -> list[Any]:

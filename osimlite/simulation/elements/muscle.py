@@ -26,6 +26,9 @@ RECORDED = (
 """What the law of a muscle gives first: N, m, N; what is kept of it besides are length and rate of the path, and the
 velocity of the fibers."""
 
+STRENGTH = "active_fiber_force"
+"""The force (N) of fully active fibers, where the tendon is taken for rigid."""
+
 SPRING = "elastic_fiber_force"
 """What of the passive force of fibers with damping is not by that, N."""
 

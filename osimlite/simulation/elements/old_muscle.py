@@ -6,7 +6,15 @@ from collections.abc import Callable
 from math import nan
 from typing import Any
 
-from osimlite.forces.old_muscles import ROUNDS, TOLERANCE, OldMuscle, cos_upright, fitted, next_length
+from osimlite.forces.old_muscles import (
+    ROUNDS,
+    TOLERANCE,
+    OldMuscle,
+    cos_upright,
+    fitted,
+    generic_velocity_factor,
+    next_length,
+)
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kind import Kind, State
 from osimlite.simulation.elements.muscle import height, muscle
@@ -70,6 +78,19 @@ def isometric_length(
     return guess.length
 
 
+def strongest(length: float, rate: float, start: float, m: OldMuscle, forces: Forces, own: Any, curves: Any) -> float:
+    """Force (N) in equilibrium at rest, fully activated, times a factor by the rate of the path.
+
+    It is what OpenSim takes for the active force along a rigid tendon; see calcInextensibleTendonActiveFiberForce of
+    ActivationFiberLengthMuscle_Deprecated. Args as of `isometric_length`.
+    """
+    if length < m.slack:
+        return 0.0
+    fiber_length = isometric_length(length, start, 1.0, m, forces, own, curves)
+    _, _, _, tendon = fibers_at(length, fiber_length, m, forces, own, curves)
+    return m.strength * tendon * generic_velocity_factor(rate, m)
+
+
 def _check(builder: ElementBuilder, force: Any) -> None:
     for flag in ("ignore_tendon_compliance", "ignore_activation_dynamics"):
         words = f"is true, which a {type(force).__name__} cannot do"
@@ -80,6 +101,7 @@ def old_muscle(
     component: type,
     law: Callable[..., Any],
     equilibrium: Callable[..., Any],
+    rigid: Callable[..., float],
     *parameters: Parameter,
     rates: tuple[str, ...] = (),
     states: tuple[State, ...] = (),
@@ -90,11 +112,17 @@ def old_muscle(
         component: its class.
         law: gives what is recorded, and then rates.
         equilibrium: gives the fiber length.
+        rigid: gives the greatest force.
         parameters: that both are given besides the muscle's numbers.
         rates: of states besides activation and fiber length.
         states: besides these.
     """
-    numbers = Number("max_isometric_force"), positive("optimal_fiber_length"), positive("tendon_slack_length")
+    numbers = (
+        Number("max_isometric_force"),
+        positive("optimal_fiber_length"),
+        positive("tendon_slack_length"),
+        Number("max_contraction_velocity"),
+    )
     return muscle(
         component,
         law,
@@ -104,5 +132,6 @@ def old_muscle(
         states=(State("activation"), State("fiber_length", output="fiber_velocity"), *states),
         equilibrium=equilibrium,
         settled=("fiber_length",),
+        rigid=rigid,
         check=_check,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import nan
 
+from osimlite.simulation.kernels.dynamics import clear_wrenches, generalized_forces
 from osimlite.simulation.kernels.layout import (
     FREEDOMS,
     ITEM_AT,
@@ -16,6 +17,7 @@ from osimlite.simulation.kernels.layout import (
     VELOCITY_STAGE,
     WORK_SIZE,
 )
+from osimlite.simulation.kernels.paths import pull_path
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
 
@@ -51,6 +53,60 @@ def look(
         for k in range(looked):
             place = order[4 + k]
             row[k] = w[place] if place < room else f[place - room]
+    return OK
+
+
+def push_each(
+    s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, law: int, states: Floats, order: Ints, found: Floats
+) -> int:
+    """What is missing of accelerations while no actuator pushes, and what each pushes by a control of 1; see `look`.
+
+    Args:
+        s: the structure.
+        x: its numbers.
+        w: room for what is found.
+        y: room for a state.
+        f: room for its derivative.
+        law: address of `inverse`.
+        states: time, state and accelerations, one after another.
+        order: how many states, how many actuators, and of each its item, the place of its control, the item of its path
+            and the place of what it pulls with by a control of 1; these two are -1 if it has no path.
+        found: generalized forces that are missing (n,), and of each actuator those that it gives (n,) and what it pulls
+            with, state by state.
+    """
+    size, freedoms, count, actuators = s[STATE_SIZE], s[FREEDOMS], order[0], order[1]
+    applied = at(f, freedoms)
+    for number in range(count):
+        given = at(states, (1 + size + freedoms) * number)
+        row = at(found, (freedoms + actuators * (freedoms + 1)) * number)
+        w[TIME] = given[0]
+        for k in range(size):
+            y[k] = given[1 + k]
+        for k in range(freedoms):
+            applied[k] = given[1 + size + k]
+        status = call(law, s, x, w, y, f, 0)
+        if status != OK:
+            return status
+        for k in range(freedoms):
+            row[k] = applied[k]
+        for actuator in range(actuators):
+            own = at(order, 2 + 4 * actuator)
+            to = at(row, freedoms + actuator * (freedoms + 1))
+            clear_wrenches(s, w)
+            for k in range(freedoms):
+                applied[k] = 0.0
+            if own[2] >= 0:
+                to[freedoms] = w[own[3]]
+                pull_path(s, x, w, y, f, own[2], w[own[3]])
+            else:
+                w[own[1]] = 1.0
+                status = call(s[own[0] + LAW], s, x, w, y, f, own[0])
+                w[own[1]], to[freedoms] = 0.0, 1.0
+                if status != OK:
+                    return status
+            generalized_forces(s, w, applied)
+            for k in range(freedoms):
+                to[k] = applied[k]
     return OK
 
 

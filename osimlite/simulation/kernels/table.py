@@ -2,8 +2,8 @@
 
 Each is compiled when the first model that needs it is made ready, and kept. Those of the engine are here; the kernel of
 a kind of force is written from its declaration, and has the name of the module that declares it; so are the one that
-brings such a force into equilibrium, with EQUILIBRIUM behind the name, that of a force that is off, with OFF, and the
-one that finds its derivatives, with RESPONSE.
+brings such a force into equilibrium, with EQUILIBRIUM behind the name, that of a force that is off, with OFF, the one
+that finds its derivatives, with RESPONSE, and that of a muscle whose tendon is taken for rigid, with RIGID.
 Kernels of probes are written likewise.
 """
 
@@ -68,13 +68,16 @@ LAW_MODULES = {
     "pull_each": "paths",
     "watch": "poses",
     "look": "poses",
+    "push_each": "poses",
+    "least_effort": "effort",
     "wrapped_path": "path_wraps",
     "geodesic_path": "geodesic_paths",
     "inverse": "dynamics",
 }
 """The module of each of the engine's own."""
 
-EQUILIBRIUM, OFF, RESPONSE = "_equilibrium", "_off", "_response"
+EQUILIBRIUM, OFF, RESPONSE, RIGID = "_equilibrium", "_off", "_response", "_rigid"
+FORMS = {EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel", RESPONSE: "response_kernel", RIGID: "rigid_kernel"}
 
 LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
 """Index of a law's address among those that begin at `layout.LAWS`."""
@@ -88,8 +91,7 @@ def law_function(name: str) -> Callable[..., Any]:
     elif name.endswith("_probe"):
         function = import_module(f"osimlite.simulation.elements.probes.{name}").PROBE.kernel
     else:
-        module = name.removesuffix(EQUILIBRIUM).removesuffix(OFF).removesuffix(RESPONSE)
+        module = next((name.removesuffix(form) for form in FORMS if name.endswith(form)), name)
         kind = import_module(f"osimlite.simulation.elements.kinds.{module}").KIND
-        forms = {EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel", RESPONSE: "response_kernel"}
-        function = getattr(kind.text, forms.get(name.removeprefix(module), "kernel"))
+        function = getattr(kind.text, FORMS.get(name.removeprefix(module), "kernel"))
     return function

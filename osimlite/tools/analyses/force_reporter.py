@@ -11,11 +11,12 @@ from osimlite.tools.constraint_forces import recorded
 from osimlite.tools.motion import Motion, Tables
 
 ENERGY = "PotentialEnergy"
-_DESCRIPTION = (
+DESCRIPTION = (
     "\nThis file contains the forces exerted on a model during a simulation.\n"
     "\nA force is a generalized force, meaning that it can be either a force (N) or a torque (Nm).\n"
     f"\n{UNITS}"
 )
+"""What the header of forces says besides."""
 
 
 def compute(analysis: ForceReporter, motion: Motion, tables: Tables) -> None:
@@ -28,4 +29,4 @@ def compute(analysis: ForceReporter, motion: Motion, tables: Tables) -> None:
     if analysis.include_constraint_forces and motion.simulation.constraints:
         more, found = recorded(motion)
         labels, rows = labels + more, np.hstack([rows, found])
-    tables.add("forces", "ModelForces", labels, rows, description=_DESCRIPTION)
+    tables.add("forces", "ModelForces", labels, rows, description=DESCRIPTION)

@@ -8,20 +8,14 @@ import numpy as np
 
 from osimlite.multibody.schema_frames import Placements
 from osimlite.multibody.spatial import Array
-from osimlite.schema.actuators import (
-    CoordinateActuator,
-    PointActuator,
-    PointToPointActuator,
-    ScalarActuator,
-    TorqueActuator,
-)
+from osimlite.schema.actuators import ScalarActuator
 from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
-from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.tools.analyses import JointReaction
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.files.storage import read_sto
 from osimlite.simulation.given_controls import driven
+from osimlite.simulation.static_optimization import ideal
 from osimlite.text import counted, did_you_mean, listed
 from osimlite.tools.joint_wrenches import JointWrenches
 from osimlite.tools.motion import Motion, Tables
@@ -125,26 +119,14 @@ def _overridden(analysis: JointReaction, motion: Motion, tables: Tables) -> tupl
     model.controller_set.objects.clear()
     places = {id(force): number for number, force in enumerate(model.force_set.objects)}
     for item in actuators:
-        ideal = _ideal(item)
-        if ideal is None or id(item) not in places:
+        other = ideal(item, 1.0)
+        if other is None or id(item) not in places:
             told = f"the {type(item).__name__} '{item.name}' cannot push as '{path}' says, which is not done yet"
             raise NotRunnable(told, file=str(tables.job.file))
-        model.force_set.objects[places[id(item)]] = ideal
+        model.force_set.objects[places[id(item)]] = other
     simulation = simulation_of(tables.job, model)
     forces = {item.name: (table.times, table[item.name]) for item in actuators}
     controls = driven(simulation.forces.controls, forces, float(motion.times[-1]))
     simulation.engine.drive(controls)
     pairs = zip(motion.values.tolist(), motion.speeds.tolist(), strict=True)
     return Motion(model, simulation, motion.times, np.array([simulation.state.pack(q, u) for q, u in pairs])), controls
-
-
-def _ideal(actuator: ScalarActuator) -> ScalarActuator | None:
-    """An actuator in the place of another one that pushes with its control."""
-    if isinstance(actuator, PathActuator):
-        path = actuator.geometry_path.copy_deep()
-        return PathActuator(name=actuator.name, appliesForce=actuator.appliesForce, geometry_path=path)
-    if not isinstance(actuator, CoordinateActuator | PointActuator | PointToPointActuator | TorqueActuator):
-        return None
-    ideal = actuator.copy_deep()
-    ideal.optimal_force = 1.0
-    return ideal

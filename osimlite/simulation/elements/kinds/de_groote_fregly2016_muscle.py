@@ -1,6 +1,13 @@
 """The muscle by De Groote and Fregly."""
 
-from osimlite.forces.smooth_muscles import LARGEST_FORCE, SmoothTendon, degroote, degroote_equilibrium, tendon_growth
+from osimlite.forces.smooth_muscles import (
+    LARGEST_FORCE,
+    SmoothTendon,
+    degroote,
+    degroote_equilibrium,
+    degroote_rigid,
+    tendon_growth,
+)
 from osimlite.schema.muscles import DeGrooteFregly2016Muscle
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kind import State
@@ -43,6 +50,7 @@ KIND = muscle(
     ),
     equilibrium=degroote_equilibrium,
     settled=("normalized_tendon_force",),
+    rigid=degroote_rigid,
     check=_check,
     shares=True,
     goes_on=True,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from osimlite.forces.old_muscles import OldMuscle, scaled_activation_rate
 from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated
 from osimlite.simulation.elements.kind import State
-from osimlite.simulation.elements.old_muscle import fibers_at, isometric_length, old_muscle, recorded
+from osimlite.simulation.elements.old_muscle import fibers_at, isometric_length, old_muscle, recorded, strongest
 from osimlite.simulation.elements.parameters import Curves, Fields, Number, positive
 from osimlite.simulation.kernels.functions import value_at
 from osimlite.simulation.kernels.pointers import Floats
@@ -73,10 +73,26 @@ def equilibrium(
     return True, isometric_length(length, length - m.slack, activation, m, forces, own, curves)
 
 
+def rigid(
+    length: float,
+    rate: float,
+    excitation: float,
+    activation: float,
+    fiber_length: float,
+    fiber_velocity: float,
+    m: OldMuscle,
+    own: Delp,
+    curves: Tables,
+) -> float:
+    """The greatest force."""
+    return strongest(length, rate, length - m.slack, m, forces, own, curves)
+
+
 KIND = old_muscle(
     Delp1990Muscle_Deprecated,
     delp,
     equilibrium,
+    rigid,
     Fields(
         Delp,
         (positive("time_scale"), Number("activation1"), Number("activation2"), positive("mass")),

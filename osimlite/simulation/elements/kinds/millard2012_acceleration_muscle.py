@@ -9,6 +9,7 @@ from osimlite.forces.millard2012_acceleration import (
     millard2012_acceleration,
     millard2012_acceleration_energy,
     millard2012_acceleration_equilibrium,
+    millard2012_acceleration_rigid,
 )
 from osimlite.forces.muscle_curves import (
     ACTIVE_SIZE,
@@ -86,6 +87,7 @@ KIND = muscle(
     ),
     equilibrium=millard2012_acceleration_equilibrium,
     settled=("fiber_length", "fiber_velocity"),
+    rigid=millard2012_acceleration_rigid,
     stored=_energy,
     check=_check,
 )

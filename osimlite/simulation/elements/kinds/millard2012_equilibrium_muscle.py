@@ -9,6 +9,7 @@ from osimlite.forces.millard2012_equilibrium import (
     millard2012_energy,
     millard2012_equilibrium,
     millard2012_equilibrium_length,
+    millard2012_rigid,
 )
 from osimlite.forces.muscle_curves import (
     ACTIVE_SIZE,
@@ -128,6 +129,7 @@ KIND = muscle(
     ),
     equilibrium=millard2012_equilibrium_length,
     settled=("fiber_length",),
+    rigid=millard2012_rigid,
     stored=_energy,
     check=_check,
 )

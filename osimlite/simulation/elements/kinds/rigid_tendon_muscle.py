@@ -58,6 +58,26 @@ def rigid_tendon(
     return tension, excitation, fiber_length, cos, active, factor, active_force, passive_force, rate
 
 
+def strongest(
+    length: float,
+    rate: float,
+    excitation: float,
+    strength: float,
+    optimal: float,
+    slack: float,
+    fastest: float,
+    height: float,
+    active_curve: Floats,
+    passive_curve: Floats,
+    velocity_curve: Floats,
+) -> float:
+    """Force (N) of fully active fibers along the tendon; args as of `rigid_tendon`."""
+    _, _, _, cos, active, factor, _, _, _ = rigid_tendon(
+        length, rate, 1.0, strength, optimal, slack, fastest, height, active_curve, passive_curve, velocity_curve
+    )
+    return strength * active * factor * cos
+
+
 KIND = muscle(
     RigidTendonMuscle,
     rigid_tendon,
@@ -70,4 +90,5 @@ KIND = muscle(
     Curve("active_force_length_curve"),
     Curve("passive_force_length_curve"),
     Curve("force_velocity_curve"),
+    rigid=strongest,
 )

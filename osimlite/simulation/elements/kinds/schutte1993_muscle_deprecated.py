@@ -12,7 +12,7 @@ from osimlite.forces.old_muscles import (
 )
 from osimlite.schema.old_muscles import Schutte1993Muscle_Deprecated
 from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.elements.old_muscle import fibers_at, isometric_length, old_muscle, recorded
+from osimlite.simulation.elements.old_muscle import fibers_at, isometric_length, old_muscle, recorded, strongest
 from osimlite.simulation.elements.parameters import Curves, Fields, Number, positive
 from osimlite.simulation.kernels.functions import value_at
 from osimlite.simulation.kernels.pointers import Floats
@@ -75,6 +75,20 @@ def equilibrium(
     return True, isometric_length(length, m.optimal, activation, m, forces, own, curves)
 
 
+def rigid(
+    length: float,
+    rate: float,
+    excitation: float,
+    activation: float,
+    fiber_length: float,
+    m: OldMuscle,
+    own: Schutte,
+    curves: Tables,
+) -> float:
+    """The greatest force."""
+    return strongest(length, rate, m.optimal, m, forces, own, curves)
+
+
 def _has_curve(builder: ElementBuilder, force: Schutte1993Muscle_Deprecated) -> tuple[bool]:
     return ("passive_force_length_curve" in force.model_fields_set,)
 
@@ -83,6 +97,7 @@ KIND = old_muscle(
     Schutte1993Muscle_Deprecated,
     schutte,
     equilibrium,
+    rigid,
     Fields(
         Schutte,
         (positive("time_scale"), Number("activation1"), Number("activation2"), positive("damping")),

@@ -4,7 +4,14 @@ from collections.abc import Sequence
 from math import exp
 
 from osimlite.forces.muscles import pennation
-from osimlite.forces.thelen2003 import Thelen2003, tendon_shape, thelen2003, thelen2003_energy, thelen2003_equilibrium
+from osimlite.forces.thelen2003 import (
+    Thelen2003,
+    tendon_shape,
+    thelen2003,
+    thelen2003_energy,
+    thelen2003_equilibrium,
+    thelen2003_rigid,
+)
 from osimlite.schema.muscles import Thelen2003Muscle
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kind import DeclaredForce, State
@@ -68,6 +75,7 @@ KIND = muscle(
     ),
     equilibrium=thelen2003_equilibrium,
     settled=("fiber_length",),
+    rigid=thelen2003_rigid,
     stored=_energy,
     check=_check,
 )

@@ -12,7 +12,7 @@ from osimlite.forces.old_muscles import (
     thelen_velocity,
 )
 from osimlite.schema.old_muscles import Thelen2003Muscle_Deprecated
-from osimlite.simulation.elements.old_muscle import fibers_at, isometric_length, old_muscle, recorded
+from osimlite.simulation.elements.old_muscle import fibers_at, isometric_length, old_muscle, recorded, strongest
 from osimlite.simulation.elements.parameters import Fields, Number, positive
 
 
@@ -74,10 +74,24 @@ def equilibrium(
     return True, isometric_length(length, m.optimal, activation, m, forces, own, ())
 
 
+def rigid(
+    length: float,
+    rate: float,
+    excitation: float,
+    activation: float,
+    fiber_length: float,
+    m: OldMuscle,
+    own: FirstThelen,
+) -> float:
+    """The greatest force."""
+    return strongest(length, rate, m.optimal, m, forces, own, ())
+
+
 KIND = old_muscle(
     Thelen2003Muscle_Deprecated,
     thelen,
     equilibrium,
+    rigid,
     Fields(
         FirstThelen,
         (

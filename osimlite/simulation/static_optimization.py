@@ -1,0 +1,293 @@
+"""How muscles and other actuators share the generalized forces of a motion, moment by moment for itself.
+
+As OpenSim's StaticOptimization computes: of all activations x that give the accelerations of the motion, those with the
+least sum of |x|ᵖ. A muscle pulls with x times the force of its fully active fibers, its tendon taken for rigid, and
+without the force of passive fibers; other actuators push with x times their optimal force. Locked, prescribed and
+dependent coordinates move as the constraints let them.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from osimlite.errors import ModelError, SettingError, UnsupportedError
+from osimlite.multibody.constraints import Coupler
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
+from osimlite.schema.actuators import (
+    ActivationCoordinateActuator,
+    Actuator,
+    CoordinateActuator,
+    PointActuator,
+    PointToPointActuator,
+    ScalarActuator,
+    TorqueActuator,
+)
+from osimlite.schema.model import Model
+from osimlite.schema.muscles import Muscle
+from osimlite.schema.path_actuators import PathActuator
+from osimlite.simulation.elements import Forces, force_elements
+from osimlite.simulation.elements.gather import OPENSIM
+from osimlite.simulation.engines.linking import best
+from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.effort import effort_room
+from osimlite.simulation.system import System
+from osimlite.text import listed
+
+ALIKE = 1e-9
+"""Rates of coordinates that differ by no more are the same."""
+TITLE, FORCES_TITLE = "Static Optimization", "ModelForces"
+
+
+def ideal(actuator: ScalarActuator, optimal_force: float) -> ScalarActuator | None:
+    """An actuator in the place of another one that pushes with its control times a force; None for an unusual one."""
+    if isinstance(actuator, PathActuator):
+        path = actuator.geometry_path.copy_deep()
+        found: ScalarActuator = PathActuator(name=actuator.name, geometry_path=path)
+    elif isinstance(actuator, ActivationCoordinateActuator):
+        found = CoordinateActuator(name=actuator.name, coordinate=actuator.coordinate)
+    elif isinstance(actuator, CoordinateActuator | PointActuator | PointToPointActuator | TorqueActuator):
+        found = actuator.copy_deep()
+    else:
+        return None
+    found.appliesForce, found.optimal_force = actuator.appliesForce, optimal_force
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Shared:
+    """How the generalized forces of a motion are shared.
+
+    Attributes:
+        times: (t,), s.
+        names: of the actuators (a,).
+        activations: of all actuators (t, a); NaN at a time at which there is no solution.
+        strengths: what each pushes with at an activation of 1 (t, a), N or N m.
+        coordinates: that the actuators are to accelerate (m,).
+        lacking: generalized forces that cannot be given (t, m), N or N m; the least ones, at times without a solution.
+        solved: at which times there is a solution (t,).
+    """
+
+    times: Array
+    names: tuple[str, ...]
+    activations: Array
+    strengths: Array
+    coordinates: tuple[str, ...]
+    lacking: Array
+    solved: NDArray[np.bool_]
+
+    @property
+    def forces(self) -> Array:
+        """Of all actuators (t, a), N or N m."""
+        return self.activations * self.strengths
+
+    def table(self) -> StoTable:
+        """The activations."""
+        return StoTable(TITLE, self.times, self.names, self.activations)
+
+    def lacks(self, row: int) -> str:
+        """What is missing at a time without a solution, the worst coordinate first."""
+        sizes = np.abs(self.lacking[row])
+        worst = [place for place in np.argsort(-sizes) if sizes[place] > 0.1 * sizes.max()]
+        return listed([f"{self.lacking[row, k]:.4g} at {self.coordinates[k]}" for k in worst], most=3)
+
+
+class StaticOptimization:
+    """Shares the generalized forces of motions among the actuators of a model.
+
+    Args:
+        model: whose actuators.
+        mechanism: of it.
+        exponent: p, more than 1.
+        physiology: whether the force of a muscle depends on its length and speed, or is its max_isometric_force.
+        wrapping: how paths bend around surfaces.
+        external_loads: a file of ExternalLoads.
+        folder: where the model's file is.
+        early_return: whether Simbody's defect in contact of several surfaces is reproduced.
+
+    Raises:
+        SettingError: the exponent is not more than 1.
+        ModelError: there are no actuators, or fewer than coordinates that they are to accelerate.
+        UnsupportedError: one has no force that is proportional to its control, or cannot be computed.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        mechanism: Mechanism,
+        *,
+        exponent: float = 2.0,
+        physiology: bool = True,
+        wrapping: str = OPENSIM,
+        external_loads: str | Path | None = None,
+        folder: str | Path | None = None,
+        early_return: bool = False,
+    ) -> None:
+        if not 1.0 < exponent < np.inf:
+            raise SettingError(f"an exponent of {exponent:g} has not one answer; give a number above 1, such as 2")
+        self.mechanism, self._exponent = mechanism, exponent
+        model = model.copy_deep()
+        model.controller_set.objects.clear()
+        self._actuators = _idealised(model, physiology)
+        tree = model.tree()
+        self._paths = [tree.path_of(item) or "" for item in self._actuators]
+        self._forces = force_elements(
+            model,
+            mechanism,
+            simbody_early_return=early_return,
+            wrapping=wrapping,
+            external_loads=external_loads,
+            folder=folder,
+            rigid_tendons=True,
+        )
+        dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
+        self._free = [
+            place
+            for place, info in enumerate(mechanism.coordinates)
+            if not (info.locked or info.prescribed is not None or place in dependent)
+            and not tree.at(info.path).is_free_to_satisfy_constraints
+        ]
+        self.names = tuple(item.name for item in self._actuators)
+        self.coordinates = tuple(mechanism.coordinates[place].name for place in self._free)
+        if len(self.names) < len(self.coordinates):
+            raise ModelError(
+                f"'{model.name}' has {len(self.names)} actuators for {len(self.coordinates)} coordinates; append "
+                "reserve actuators, or lock coordinates"
+            )
+        self._bounds = np.array([(item.min_control, item.max_control) for item in self._actuators], dtype=float).T
+        for item, low, high in zip(self._actuators, *self._bounds, strict=True):
+            if not low <= high:
+                raise ModelError(f"'{item.name}' has a min_control of {low:g} above its max_control of {high:g}")
+
+    @cached_property
+    def _system(self) -> System:
+        return System(self.mechanism, self._forces)
+
+    def share(self, times: Array, values: Array, speeds: Array, accelerations: Array) -> Shared:
+        """How the actuators share what a motion takes.
+
+        Args:
+            times: (t,), s.
+            values: of all coordinates (t, n), rad and m.
+            speeds: generalized speeds (t, n).
+            accelerations: their derivatives (t, n); those of constrained coordinates do not count.
+
+        Raises:
+            SimulationError: the forces cannot be computed at one of the states.
+        """
+        system, order = self._system, list(self._system.order)
+        udot, ways = self._allowed(times, values, speeds, accelerations)
+        moments = np.column_stack([times, system.state.rows(values, speeds)])
+        needed, pushes, strengths = system.pushed(moments, np.ascontiguousarray(udot[:, order]), self._paths)
+        turned = ways[:, order]
+        needed = (needed[:, None, :] @ turned)[:, 0]
+        found, lacking, solved = self._least(pushes @ turned, needed)
+        found[~solved] = np.nan
+        own = [1.0 if isinstance(item, Muscle) else item.optimal_force for item in self._actuators]
+        return Shared(times, self.names, found, strengths * own, self.coordinates, lacking, solved)
+
+    def _least(self, columns: Array, needed: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Activations (t, a), what is missing (t, m), and whether nothing is (t,), for columns (t, a, m)."""
+        frames, count, size = columns.shape
+        code = best()
+        code.make_ready(("least_effort",))
+        sizes = np.array([frames, size, count, *[0] * (count * (size + 1))], dtype=np.int64)
+        numbers = np.array([self._exponent, *self._bounds.ravel()])
+        given = np.ascontiguousarray(np.hstack([columns.reshape(frames, -1), needed]))
+        found = np.zeros((frames, count + size + 1))
+        code.entry("least_effort")(sizes, numbers, given, found, np.zeros(effort_room(size, count)))
+        return found[:, :count], found[:, count:-1], found[:, -1] == 1.0
+
+    def _allowed(self, times: Array, values: Array, speeds: Array, wanted: Array) -> tuple[Array, Array]:
+        """Accelerations (t, n) that the constraints allow, and what moves with each free coordinate (t, n, m).
+
+        Where the constraints do not allow the accelerations of free coordinates, the nearest ones are taken.
+        """
+        size, free = len(self.mechanism.coordinates), self._free
+        ways = np.zeros((len(times), size, len(free)))
+        ways[:, free, range(len(free))] = 1.0
+        udot = wanted.copy()
+        if not self.mechanism.constraints:
+            return udot, ways
+        system = System(self.mechanism, Forces(()))
+        order, head = list(system.order), int(system.structure[layout.CONSTRAINED])
+        count = int(system.structure[head + layout.EQUATIONS])
+        rows, drifts = (int(system.structure[head + place]) for place in (layout.WORK_ROWS, layout.WORK_DRIFTS))
+        moments = np.column_stack([times, system.state.rows(values, speeds)])
+        places = [*range(rows, rows + count * len(order)), *range(drifts, drifts + count)]
+        looked = system.looked(moments, places, layout.ACCELERATION_STAGE)
+        equations = np.zeros((len(times), count, size))
+        equations[:, :, order] = looked[:, : -count or None].reshape(len(times), count, -1)
+        targets = looked[:, looked.shape[1] - count :]
+        held = [place for place in range(size) if place not in free]
+        inverse = np.linalg.pinv(equations[:, :, held])
+        ways[:, held] = -inverse @ equations[:, :, free]
+        left_over = targets[..., None] - equations[:, :, free] @ wanted[:, free, None]
+        udot[:, held] = (inverse @ left_over)[..., 0]
+        left = np.abs(equations @ ways).max(axis=(1, 2), initial=0.0) > ALIKE
+        is_fixed = np.linalg.matrix_rank(equations[:, :, held]) == len(held)
+        for row in np.flatnonzero(left | ~is_fixed):
+            udot[row], ways[row] = self._nearest(equations[row], targets[row], wanted[row])
+        return udot, ways
+
+    def _nearest(self, equations: Array, targets: Array, wanted: Array) -> tuple[Array, Array]:
+        """The same at one time, where the held coordinates do not follow from the free ones alone."""
+        _, sizes, turned = np.linalg.svd(equations)
+        rank = int(np.sum(sizes > ALIKE * sizes[0])) if len(sizes) else 0
+        directions = turned[rank:].T
+        free = directions[self._free]
+        if np.linalg.matrix_rank(free) < directions.shape[1]:
+            names = [info.name for place, info in enumerate(self.mechanism.coordinates) if place not in self._free]
+            raise UnsupportedError(f"{listed(names)} can move apart from all coordinates that are to be accelerated")
+        start = np.linalg.pinv(equations) @ targets
+        back = np.linalg.pinv(free)
+        return start + directions @ (back @ (wanted - start)[self._free]), directions @ back
+
+    def records(self, shared: Shared, values: Array, speeds: Array) -> StoTable:
+        """What all forces report while actuators push so: the columns of OpenSim's ForceReporter."""
+        places = {path: k for k, path in enumerate(self._paths)}
+        elements = self._forces.elements
+        others = Forces(tuple(item for item in elements if item.path not in places))
+        labels = [label for item in elements for label in item.columns]
+        from_others = np.empty((len(shared.times), 0))
+        if any(item.columns for item in others.elements):
+            system = System(self.mechanism, others)
+            moments = zip(shared.times.tolist(), system.state.rows(values, speeds).tolist(), strict=True)
+            from_others = np.array([system.force_records(t, y) for t, y in moments])
+        columns, at, forces = [], 0, shared.forces
+        for item in elements:
+            if item.path in places:
+                columns.append(forces[:, [places[item.path]]])
+            else:
+                columns.append(from_others[:, at : at + len(item.columns)])
+                at += len(item.columns)
+        return StoTable(FORCES_TITLE, shared.times, tuple(labels), np.hstack(columns))
+
+
+def _idealised(model: Model, physiology: bool) -> list[ScalarActuator]:
+    """The actuators that push, once those of a model that are no muscles push by their controls alone."""
+    places = {id(force): number for number, force in enumerate(model.force_set.objects)}
+    found: list[ScalarActuator] = []
+    for item in list(model.components(Actuator)):
+        if not item.appliesForce:
+            continue
+        if not isinstance(item, ScalarActuator):
+            raise UnsupportedError(f"'{item.name}' is a {type(item).__name__}, which has no single control")
+        if not (isinstance(item, Muscle) and physiology):
+            force = item.max_isometric_force if isinstance(item, Muscle) else getattr(item, "optimal_force", 0.0)
+            other = ideal(item, force)
+            if other is None or id(item) not in places:
+                told = f"'{item.name}' ({type(item).__name__}) does not push in proportion to its control"
+                raise UnsupportedError(f"{told}; set its appliesForce to false")
+            other.min_control, other.max_control = item.min_control, item.max_control
+            model.force_set.objects[places[id(item)]] = item = other
+        found.append(item)
+    if not found:
+        raise ModelError(f"'{model.name}' has no actuators")
+    return found

@@ -1,0 +1,57 @@
+"""OpenSim's StaticOptimization: how muscles and reserve actuators share what the motion takes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from osimlite.schema.tools.analyses import StaticOptimization as Setup
+from osimlite.simulation.files.control_nodes import control_set
+from osimlite.simulation.static_optimization import Shared, StaticOptimization
+from osimlite.text import counted
+from osimlite.tools.analyses.force_reporter import DESCRIPTION
+from osimlite.tools.motion import Motion, Tables
+from osimlite.tools.not_runnable import NotRunnable
+
+_DESCRIPTION = "This file contains static optimization results.\n"
+
+
+def compute(analysis: Setup, motion: Motion, tables: Tables) -> None:
+    """Write activations, forces and controls; what has no solution is no number there, and told."""
+    job = tables.job
+    if motion.record is None:
+        told = f"'{analysis.name}' cannot be computed of a motion that was not measured; give it to an AnalyzeTool"
+        raise NotRunnable(told, file=str(job.file))
+    if not analysis.use_model_force_set:
+        told = f"'{analysis.name}' has use_model_force_set off, with which OpenSim crashes; set it to true"
+        raise NotRunnable(told, file=str(job.file))
+    problem = StaticOptimization(
+        motion.model,
+        motion.mechanism,
+        exponent=analysis.activation_exponent,
+        physiology=analysis.use_muscle_physiology,
+        external_loads=job.path("external_loads_file"),
+        folder=job.needed("model_file").parent,
+        early_return=True,
+    )
+    shared = problem.share(motion.times, motion.values, motion.speeds, motion.wanted)
+    forces = problem.records(shared, motion.values, motion.speeds)
+    activations = shared.table()
+    tables.add("activation", activations.name, activations.columns, activations.rows, description=_DESCRIPTION)
+    tables.add("force", forces.name, forces.columns, forces.rows, description=DESCRIPTION)
+    tables.add_text("controls.xml", "".join(control_set(activations)))
+    tell(shared, analysis.name, tables)
+
+
+def tell(shared: Shared, name: str, tables: Tables) -> None:
+    """Say how it went: times without a solution, and what is missing there."""
+    outcome = tables.outcome
+    failed = np.flatnonzero(~shared.solved)
+    outcome.summary[f"{name}_unsolved"] = len(failed)
+    if len(failed):
+        outcome.done = False
+        worst = failed[np.argmax(np.abs(shared.lacking[failed]).max(axis=1))]
+        outcome.tell(
+            name,
+            f"no solution at {len(failed)} of {counted(len(shared.times), 'time')}, from {shared.times[failed[0]]:g} s "
+            f"on, where nothing is written; at {shared.times[worst]:g} s the actuators lack {shared.lacks(worst)}",
+        )

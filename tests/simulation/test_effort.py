@@ -1,0 +1,139 @@
+"""Least effort with equations and bounds, held to other programs on random problems."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.random import Generator, default_rng
+
+from osimlite.multibody.spatial import Array
+from osimlite.simulation.engines.linking import PYTHON, Code, best
+from osimlite.simulation.kernels.effort import effort_room
+
+optimize: Any = pytest.importorskip("scipy.optimize", reason="needs scipy (extra 'sweep')")
+
+
+def solved(
+    columns: Array, wanted: Array, low: Array, high: Array, power: float = 2.0, code: Code | None = None
+) -> tuple[Array, Array, Array]:
+    """Unknowns, what is missing, and whether nothing is; for columns (t, n, m)."""
+    frames, n, m = columns.shape
+    sizes = np.array([frames, m, n, *[0] * (n * (m + 1))], dtype=np.int64)
+    given = np.hstack([columns.reshape(frames, -1), wanted])
+    found = np.zeros((frames, n + m + 1))
+    code = code or best()
+    code.make_ready(("least_effort",))
+    numbers = np.concatenate([[power], low, high])
+    code.entry("least_effort")(sizes, numbers, given, found, np.zeros(effort_room(m, n)))
+    return found[:, :n], found[:, n:-1], found[:, -1]
+
+
+def problem(random: Generator, m: int, n: int, frames: int = 1) -> tuple[Array, Array, Array, Array]:
+    """Columns, right sides that some unknowns give, and bounds of which some are infinite."""
+    columns = random.normal(size=(frames, n, m)) * (random.random((frames, n, m)) < 0.6)
+    low, high = -random.random(n), random.random(n)
+    low[::4], high[::4] = -np.inf, np.inf
+    low[1::4] = 0.01
+    high[1::4] = 1.0
+    within = random.uniform(np.maximum(low, -1.0), np.minimum(high, 1.0), size=(frames, n))
+    return columns, np.einsum("tnm,tn->tm", columns, within), low, high
+
+
+def test_the_quadratic_problem() -> None:
+    random = default_rng(3)
+    for _ in range(30):
+        m = int(random.integers(1, 12))
+        n = int(random.integers(m, 3 * m + 5))
+        columns, wanted, low, high = problem(random, m, n)
+        (x,), (missing,), (is_solved,) = solved(columns, wanted, low, high)
+        assert is_solved
+        assert x @ columns[0] == pytest.approx(wanted[0], abs=1e-11)
+        assert missing == pytest.approx(0.0, abs=1e-11)
+        assert (low <= x).all()
+        assert (x <= high).all()
+        # At the least one, x plus what the multipliers of bounds push is in the range of the equations.
+        free = (low < x) & (x < high)
+        push, *_ = np.linalg.lstsq(columns[0][free], x[free], rcond=None)
+        pulled = columns[0] @ push
+        assert pulled[free] == pytest.approx(x[free], abs=1e-8)
+        rest = ~free
+        if np.linalg.matrix_rank(columns[0][free]) == m:
+            assert (
+                np.where(x[rest] == low[rest], pulled[rest] <= low[rest] + 1e-8, pulled[rest] >= high[rest] - 1e-8)
+            ).all()
+
+
+def by_others(columns: Array, wanted: Array, low: Array, high: Array, power: float, start: Array) -> float:
+    """The least sum that SciPy finds."""
+    found = optimize.minimize(
+        lambda x: np.sum(np.abs(x) ** power),
+        start,
+        jac=lambda x: power * np.sign(x) * np.abs(x) ** (power - 1.0),
+        bounds=list(zip(low, high, strict=True)),
+        constraints={"type": "eq", "fun": lambda x: x @ columns - wanted, "jac": lambda x: columns.T},
+        method="SLSQP",
+        options={"maxiter": 500, "ftol": 1e-14},
+    )
+    return float(found.fun) if found.success else np.inf
+
+
+@pytest.mark.parametrize("power", [1.5, 2.0, 3.0, 4.0, 10.0])
+def test_other_powers(power: float) -> None:
+    random = default_rng(5)
+    for _ in range(10):
+        m = int(random.integers(1, 6))
+        columns, wanted, low, high = problem(random, m, 2 * m + 3)
+        (x,), _, (is_solved,) = solved(columns, wanted, low, high, power)
+        assert is_solved
+        assert x @ columns[0] == pytest.approx(wanted[0], abs=1e-9)
+        start = np.clip(x + 0.05 * random.normal(size=len(x)), low, high)
+        other = by_others(columns[0], wanted[0], low, high, power, start)
+        assert np.sum(np.abs(x) ** power) <= other + 1e-7 * max(1.0, other)
+
+
+def test_frames_that_follow_one_another_are_as_alone() -> None:
+    columns, wanted, low, high = problem(default_rng(7), 6, 15, frames=20)
+    together, _, _ = solved(columns, wanted, low, high)
+    alone = [solved(columns[[k]], wanted[[k]], low, high)[0][0] for k in range(20)]
+    assert together == pytest.approx(np.array(alone), abs=1e-11)
+
+
+def test_equations_that_repeat_each_other() -> None:
+    columns, wanted, low, high = problem(default_rng(8), 4, 12)
+    alone, _, _ = solved(columns, wanted, low, high)
+    twice = np.concatenate([columns, 3.0 * columns], axis=2), np.hstack([wanted, 3.0 * wanted])
+    (x,), _, (is_solved,) = solved(*twice, low, high)
+    assert is_solved
+    assert x == pytest.approx(alone[0], abs=1e-9)
+
+
+def test_what_is_missing_where_there_is_no_solution() -> None:
+    random = default_rng(9)
+    for _ in range(20):
+        m = int(random.integers(1, 6))
+        columns, _, low, high = problem(random, m, 2 * m + 2)
+        low, high = np.maximum(low, -1.0), np.minimum(high, 1.0)
+        wanted = 100.0 * random.normal(size=(1, m))
+        _, (missing,), (is_solved,) = solved(columns, wanted, low, high)
+        assert not is_solved
+        scale = np.linalg.norm(columns[0], axis=0)
+        nearest = optimize.lsq_linear(columns[0].T / scale[:, None], wanted[0] / scale, (low, high), tol=1e-12)
+        assert missing / scale == pytest.approx(-nearest.fun, abs=1e-4 * np.abs(nearest.fun).max())
+
+
+def test_one_after_the_other_a_solution_and_none() -> None:
+    columns, wanted, low, high = problem(default_rng(10), 5, 12, frames=3)
+    low, high = np.maximum(low, -1.0), np.minimum(high, 1.0)
+    wanted[1] = 1000.0
+    x, _, is_solved = solved(columns, wanted, low, high)
+    assert is_solved.tolist() == [1.0, 0.0, 1.0]
+    assert x[2] == pytest.approx(solved(columns[[2]], wanted[[2]], low, high)[0][0], abs=1e-11)
+
+
+def test_python_does_the_same() -> None:
+    columns, wanted, low, high = problem(default_rng(11), 3, 8)
+    assert solved(columns, wanted, low, high, code=PYTHON)[0] == pytest.approx(
+        solved(columns, wanted, low, high)[0], abs=1e-12
+    )
