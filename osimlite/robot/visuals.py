@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import copysign
 from typing import Protocol
 
@@ -21,6 +22,9 @@ from osimlite.schema.tree import Tree
 _Y_TO_Z = transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
 """The frame, in OpenSim's cylinder frame, in which the cylinder lies along Z."""
 _Y_TO_Z[np.abs(_Y_TO_Z) < 1e-15] = 0.0
+
+GREATEST = 3e38
+"""Of sizes (m): programs draw in numbers of single precision."""
 
 
 class Note(Protocol):
@@ -92,7 +96,8 @@ class _Collector:
             note("appearance", path, "a shape drawn as points or lines, or with a texture", "filled, in its colour")
         body, where = self.mechanism.frames[frame]
         owner = "/ground" if body < 0 else self.mechanism.bodies[body].path
-        visual = Visual(shape, where @ placed, (*appearance.color, appearance.opacity), path)
+        red, green, blue, opacity = (min(max(part, 0.0), 1.0) for part in (*appearance.color, appearance.opacity))
+        visual = Visual(shape, where @ placed, (red, green, blue, opacity), path)
         self.found.by_body.setdefault(owner, []).append(visual)
 
     def _shape(self, geometry: Geometry, path: str) -> tuple[Shape, Array] | None:
@@ -101,23 +106,27 @@ class _Collector:
         scale = tuple(abs(factor) for factor in geometry.scale_factors)
         match geometry:
             case Brick():
-                x, y, z = (2.0 * half * factor for half, factor in zip(geometry.half_lengths, scale, strict=True))
-                return Box((x, y, z)), here
+                x, y, z = sizes = tuple(2.0 * half * by for half, by in zip(geometry.half_lengths, scale, strict=True))
+                return (Box((x, y, z)), here) if self._drawn(path, sizes) else None
             case Sphere() | Ellipsoid():
                 own = (geometry.radius,) * 3 if isinstance(geometry, Sphere) else geometry.radii
-                a, b, c = radii = tuple(radius * factor for radius, factor in zip(own, scale, strict=True))
+                a, b, c = sizes = tuple(radius * factor for radius, factor in zip(own, scale, strict=True))
+                if not self._drawn(path, sizes):
+                    return None
                 if a == b == c:
                     return Ball(a), here
                 file = self.mesh_files.stretched("ellipsoid", ball(), (a, b, c))
-                note("ellipsoid", path, "an ellipsoid", "written as a mesh file", f"{file}, half axes {radii} m")
+                note("ellipsoid", path, "an ellipsoid", "written as a mesh file", f"{file}, half axes {sizes} m")
                 return MeshFile(file), here
             case Cylinder():
                 # OpenSim's X, Y, Z are the X, Z, -Y of a frame in which the cylinder lies along Z.
-                a, b, length = (
+                a, b, length = sizes = (
                     geometry.radius * scale[0],
                     geometry.radius * scale[2],
                     2 * geometry.half_height * scale[1],
                 )
+                if not self._drawn(path, sizes):
+                    return None
                 if a == b:
                     return Tube(a, length), _Y_TO_Z
                 file = self.mesh_files.stretched("elliptic_cylinder", tube(), (a, b, length))
@@ -127,6 +136,14 @@ class _Collector:
                 return self._mesh(geometry, path)
         note("visual", path, f"a shape of class {type(geometry).__name__}", "left out")
         return None
+
+    def _drawn(self, path: str, sizes: Sequence[float]) -> bool:
+        """Whether programs can draw a shape of these sizes; otherwise that is noted."""
+        if all(0.0 < size < GREATEST for size in sizes):
+            return True
+        given = " ".join(f"{size:g}" for size in sizes)
+        self.note("visual", path, "a shape whose size is no positive number", "left out", f"{given} m")
+        return False
 
     def _mesh(self, geometry: Mesh, path: str) -> tuple[Shape, Array] | None:
         shape = mesh_shape(geometry.mesh_file, path, self.mesh_files, self.note, geometry.scale_factors)

@@ -44,6 +44,8 @@ SCALE = 200.0
 """MuJoCo's default of a number that does not count where the force is given."""
 FVMAX = 1.4
 """Force of lengthening fibers, as a part of the isometric one, of a muscle that does not say."""
+LEAST_RATE = 1e-12
+"""MuJoCo takes rates and parts of forces that are positive; less than this is none."""
 FREE = 0.25
 """Parts by which a fit to forces may change tendon, fibers and strength, and by which it may move the passive curve."""
 
@@ -101,10 +103,9 @@ class Curves(NamedTuple):
 
     def numbers(self, vmax: float, fvmax: float) -> tuple[Array, Array]:
         """MuJoCo's numbers of gain and bias of an actuator whose length range is (tendon, tendon + fiber)."""
-        gain = np.array((0.0, 1.0, self.force, SCALE, self.lmin, self.lmax, vmax, self.fpmax, fvmax))
-        bias = np.array(
-            (-self.shift, 1.0 - self.shift, self.force, SCALE, self.lmin, self.end, vmax, self.fpmax, fvmax)
-        )
+        fpmax = max(self.fpmax, LEAST_RATE)
+        gain = np.array((0.0, 1.0, self.force, SCALE, self.lmin, self.lmax, vmax, fpmax, fvmax))
+        bias = np.array((-self.shift, 1.0 - self.shift, self.force, SCALE, self.lmin, self.end, vmax, fpmax, fvmax))
         return tidy(gain), tidy(bias)
 
 
@@ -115,6 +116,9 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
     own = Curves(force.tendon_slack_length, force.optimal_fiber_length * cos, force.max_isometric_force * cos)
     if not (own.fiber > 0.0 and own.force > 0.0 and own.tendon >= 0.0):
         raise Unsayable("its lengths or its force are not positive")
+    vmax, fvmax = _asked(force, "vmax", 0.0) / cos**2, _asked(force, "fvmax", FVMAX)
+    if not min(vmax, fvmax) > LEAST_RATE:
+        raise Unsayable("its greatest velocity, or what it holds while it lengthens, is not positive")
     fits = draft.options.fit == "force"
     try:
         spread = [np.quantile(lengths, np.linspace(0.0, 1.0, LENGTHS)) for lengths in (tied.lengths, tied.held_out)]
@@ -125,7 +129,7 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
     name, limits = draft.name("actuator", path), (max(force.min_control, 0.0), min(force.max_control, 1.0))
     rise, fall = _asked(force, "rise", 0.0), _asked(force, "fall", 0.0)
     lags = rise > 0.0 and fall > 0.0 and "activation" in states_of(force)
-    gain, bias = curves.numbers(_asked(force, "vmax", 0.0) / cos**2, _asked(force, "fvmax", FVMAX))
+    gain, bias = curves.numbers(vmax, fvmax)
     add(
         draft.section("actuator"),
         "general",

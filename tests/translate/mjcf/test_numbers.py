@@ -1,0 +1,128 @@
+"""Models with numbers that nobody should give: MuJoCo takes the export, or one sentence refuses it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import pytest
+from hypothesis import HealthCheck, assume, example, given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+import osimlite
+from osimlite import Body, Coordinate, Model, PinJoint
+from osimlite.errors import OsimliteError
+from osimlite.schema.base import Object
+from osimlite.schema.geometry import Brick, Cylinder, Ellipsoid, Geometry, Sphere
+from osimlite.schema.muscles import Millard2012EquilibriumMuscle
+from tests.translate.mjcf.test_names import HOSTILE, hostile
+
+FIXTURES = Path(__file__).resolve().parents[3] / "fixtures"
+FILES = ("lint/skeleton.osim", "lint/limb.osim", "walker/DynamicWalkerModel.osim")
+NUMBERS = st.one_of(
+    st.sampled_from((1e-320, 1e308, -1e308, -0.0, 0.0, float("inf"), float("-inf"), float("nan"), 1e-16, 1e30, -1.0)),
+    st.floats(),
+)
+OPTIONS = st.sampled_from(({}, {}, {"mujoco": 3}, {"driver": True}, {"contact": "none"}, {"spline": "quartic"}))
+
+
+def numbers(model: Model) -> list[tuple[Object, str, int | None]]:
+    """Where a model has a number: in what, in which property, and which of several."""
+
+    def held(thing: Object) -> Iterator[tuple[Object, str, int | None]]:
+        for name in type(thing).model_fields:
+            value = getattr(thing, name)
+            items = value if isinstance(value, list | tuple) else [value]
+            if isinstance(value, float):
+                yield thing, name, None
+            elif items and all(isinstance(item, float) for item in items):
+                yield from ((thing, name, place) for place in range(len(items)))
+            for item in items:
+                if isinstance(item, Object) and id(item) not in seen:
+                    seen.add(id(item))
+                    yield from held(item)
+
+    seen: set[int] = {id(model)}
+    return list(held(model))
+
+
+def taken(model: Model, **options: Any) -> bool:
+    """Whether there is an export, which MuJoCo then takes."""
+    try:
+        mjcf = osimlite.to_mjcf(model, **options)
+    except OsimliteError as refusal:
+        assert "\n" not in str(refusal)
+        return False
+    mujoco.MjModel.from_xml_string(mjcf.text, mjcf.files)
+    return True
+
+
+def with_shape(shape: Geometry) -> Model:
+    model = Model(name="m")
+    body = model.add(Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    model.add(PinJoint(name="j", coordinates=[Coordinate(name="q")]).between(model.ground, body))
+    body.attach(shape)
+    return model
+
+
+@settings(max_examples=15, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much], deadline=None)
+@given(st.sampled_from((None, *FILES)), st.data(), OPTIONS)
+def test_mujoco_takes_models_with_any_numbers(file: str | None, data: st.DataObject, options: dict[str, Any]) -> None:
+    if file is None:
+        names = st.one_of(st.sampled_from(HOSTILE), st.text(max_size=6))
+        model = hostile(data.draw(st.lists(names, min_size=50, max_size=50)))
+    else:
+        model = osimlite.read(FIXTURES / file)
+    places = numbers(model)
+    for place in data.draw(st.lists(st.sampled_from(range(len(places))), min_size=1, max_size=3, unique=True)):
+        thing, name, which = places[place]
+        value, new = getattr(thing, name), data.draw(NUMBERS)
+        try:
+            setattr(thing, name, new if which is None else (*value[:which], new, *value[which + 1 :]))
+        except ValidationError:
+            assume(False)
+    taken(model, **options)
+
+
+@given(st.sampled_from(("radius", "flat", "brick", "thin", "low", "scale", "color")), NUMBERS)
+@example("radius", 0.0)
+@example("brick", -1.0)
+@example("scale", float("nan"))
+@example("low", 1e308)
+@example("color", 1e39)
+def test_shapes_of_any_size(what: str, number: float) -> None:
+    shapes = {
+        "radius": Sphere(radius=number),
+        "flat": Ellipsoid(radii=(number, 0.1, 0.2)),
+        "brick": Brick(half_lengths=(0.1, number, 0.1)),
+        "thin": Cylinder(radius=number, half_height=0.1),
+        "low": Cylinder(radius=0.1, half_height=number),
+        "scale": Cylinder(radius=0.1, half_height=0.1, scale_factors=(number, 1.0, 1.0)),
+    }
+    shape = shapes.get(what, Sphere(radius=0.1))
+    if what == "color":
+        shape.appearance.color = (number, 0.5, 0.5)
+    assert taken(with_shape(shape)) or what == "color"
+
+
+def test_a_shape_without_a_size_is_left_out_with_a_word() -> None:
+    model = with_shape(Brick(half_lengths=(0.1, 0.0, 0.1)))
+    for translated in (osimlite.to_mjcf(model), osimlite.to_urdf(model)):
+        (record,) = [record for record in translated.fidelity.records if record.kind == "visual"]
+        assert record.cannot_say == "a shape whose size is no positive number"
+        assert record.detail == "0.2 0 0.2 m"
+
+
+@pytest.mark.parametrize("velocity", [1e-320, 0.0, -1.0])
+def test_a_muscle_that_cannot_shorten_is_left_out_with_a_word(velocity: float) -> None:
+    model = hostile(f"n{k}" for k in range(50))
+    muscle = next(iter(model.components(Millard2012EquilibriumMuscle)))
+    muscle.max_contraction_velocity = velocity
+    mjcf = osimlite.to_mjcf(model)
+    mujoco.MjModel.from_xml_string(mjcf.text, mjcf.files)
+    own = [item for item in mjcf.fidelity.records if item.component == f"/forceset/{muscle.name}"]
+    (record,) = [item for item in own if item.kind == "force"]
+    assert record.done.startswith("left out: ")
