@@ -272,7 +272,7 @@ class _Search:
             scaled = roots[own, None, None]
             rows = (scaled * by[frame, own]).reshape(-1, size)
             # What poses make good is no error of sizes: the part across their directions counts.
-            moved = (scaled * moves[own]).reshape(len(rows), -1)
+            moved = (scaled * moves[own]).reshape(len(rows), moves.shape[-1])
             squares, axes = np.linalg.eigh(moved.T @ moved)
             certain = squares > 1e-12 * squares.max(initial=1e-300)
             directions = moved @ (axes[:, certain] / np.sqrt(squares[certain]))

@@ -110,7 +110,7 @@ class _Points:
 
     def __init__(self, mechanism: Mechanism, stations: Sequence[StationPlacement]) -> None:
         self._mechanism, free = mechanism, mechanism.released()
-        self._system = System(free, Forces(()))
+        self._system = System(free, Forces(()), apart=True)
         links = [self._system.placements[place.body][0] for place in stations]
         self._carrying, self._links = np.unique(links, return_inverse=True)
         frames = [self._system.placements[place.body][1] for place in stations]

@@ -194,3 +194,32 @@ def test_markers_that_stand_still_are_no_reason_to_fail() -> None:
     found = fit(marked(), {"still": frozen}, held=HELD)
     assert found.errors(found.after)["still"] < 0.01
     assert max(max(own) for own in found.factors.values()) < 1.6
+
+
+def test_bodies_that_are_fixed_to_ground_and_poses_that_are_given() -> None:
+    """Markers there say how large such bodies are."""
+    model = osimlite.Model(name="stand")
+    post = osimlite.Body(name="post", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    arm = osimlite.Body(name="arm", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    model.add(post, arm)
+    model.add(osimlite.WeldJoint(name="weld", socket_parent_frame=model.ground, socket_child_frame=post))
+    top = osimlite.PhysicalOffsetFrame(name="top", socket_parent=post, translation=(0.0, 1.0, 0.0))
+    post.components.append(top)
+    model.add(osimlite.PinJoint(name="pin", socket_parent_frame=top, socket_child_frame=arm))
+    for body in (post, arm):
+        for number, place in enumerate(np.eye(3)):
+            model.add(
+                osimlite.Marker(
+                    name=f"{body.name}{number}", socket_parent_frame=body, location=tuple(place.tolist()), fixed=True
+                )
+            )
+    mechanism = osimlite.mechanism(model)
+    places = [1.2 * np.array([*mechanism.station_positions([0.1 * k]).values()]) for k in range(10)]
+    names = [path.rpartition("/")[2] for path in mechanism.station_positions([0.0])]
+    data = {name: np.array([row[k] for row in places]) for k, name in enumerate(names)}
+    found = fit(model, {"turning": data})
+    assert found.factors["post"] == pytest.approx([1.2] * 3, rel=1e-3)
+    assert found.factors["arm"] == pytest.approx([1.2] * 3, rel=1e-3)
+    (coordinate,) = model.components(osimlite.Coordinate)
+    coordinate.locked = True
+    assert fit(model, {"still": {name: rows[:1] for name, rows in data.items()}}).factors["arm"][0] > 1.19
