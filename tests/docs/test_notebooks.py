@@ -15,6 +15,7 @@ SHOWN = {
     "moment_arms": {"<iframe", "moment arms (m)"},
     "sweep": {"<iframe", "400 runs", "best:"},
     "mujoco": {"<iframe", "MuJoCo cannot say"},
+    "whole_subject": {"<iframe", "worst_marker", "afterwards"},
 }
 """What the outputs of each must have among them."""
 
