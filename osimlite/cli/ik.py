@@ -43,15 +43,19 @@ def ik(
     from osimlite.files import make_folder, write_atomically
     from osimlite.fitting.ik_tool import motion_table, told
     from osimlite.fitting.inverse_kinematics import inverse_kinematics
+    from osimlite.fitting.marker_data import MarkerData
     from osimlite.fitting.orientation_data import holds_orientations
+    from osimlite.schema.markers import Marker
     from osimlite.simulation.files.old_storage import UNITS, printed
     from osimlite.simulation.files.storage import write_sto
+    from osimlite.text import listed
 
     weights, kept = options.named_numbers(weight, "--weight"), options.named_numbers(keep, "--keep")
     of_sensors = holds_orientations(trial)
+    model, data = read(file), None if of_sensors else MarkerData.of(trial)
     motion = inverse_kinematics(
-        read(file),
-        None if of_sensors else trial,
+        model,
+        data,
         orientations=trial if of_sensors else None,
         weights=weights,
         coordinates=kept,
@@ -68,4 +72,10 @@ def ik(
     write_sto(folder / f"{what}_errors.sto", f"{what} errors", motion.times.tolist(), names, errors.tolist())
     for line in told(motion):
         say(line)
+    if data is not None:
+        known = {marker.name: None for marker in model.components(Marker)}
+        if missing := [name for name in known if name not in data.names]:
+            say(f"of the model, not in the data: {listed(missing)}")
+        if unknown := [name for name in data.names if name not in known]:
+            say(f"in the data, not of the model: {listed(unknown)}")
     say(f"wrote {folder / 'ik.mot'} and {folder / f'{what}_errors.sto'}")

@@ -29,6 +29,8 @@ from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.simulation.files.times import both_of
 from osimlite.text import counted, did_you_mean, listed
 
+ABSURD = 1.0
+"""A root mean square of the marker errors (m) that no pose of a person leaves."""
 UNNAMED = ("", "Unassigned")
 """What stands for no file."""
 
@@ -124,6 +126,7 @@ def told(motion: FittedMotion) -> Iterator[str]:
     if "rms_marker_error" in found:
         rms, largest = found["rms_marker_error"], found["largest_marker_error"]
         advised = "" if rms < ADVICE[0] and largest < ADVICE[1] else "; OpenSim advises less than 2 and 4 cm"
+        advised += "; check the units of the data" if rms > ABSURD else ""
         yield (
             f"{counted(found['frames'], 'frame')}, {counted(found['markers'], 'marker')}: "
             f"errors of {100.0 * rms:.2f} cm (root mean square), "

@@ -61,6 +61,8 @@ class Recording:
         Raises:
             SettingError: the arrays do not fit together.
         """
+        if not isinstance(arrays, Mapping):
+            raise SettingError(f"{cls.noun}s are a file, or arrays by their names, not a {type(arrays).__name__}")
         values = [np.asarray(value, dtype=float) for value in arrays.values()]
         values = [value[None] if value.ndim == len(cls.shape) else value for value in values]
         counts = {value.shape for value in values}

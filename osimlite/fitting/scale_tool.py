@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -85,7 +86,7 @@ def scale(
         end: time up to which, s.
 
     Raises:
-        SettingError: something names what is not there, or markers are needed and not given.
+        SettingError: something names what is not there, a factor is not positive, or markers are needed and not given.
     """
     copy = model.copy_deep()
     wanted = measurements if not isinstance(measurements, Mapping) else _measurements(measurements)
@@ -101,6 +102,9 @@ def scale(
         if name not in measuring.frames:
             raise SettingError(f"'{model.name}' has no body '{name}'{did_you_mean(name, measuring.frames)}")
         three = (given, given, given) if isinstance(given, int | float) else tuple(given)
+        if not all(0.0 < number < math.inf for number in three):
+            numbers = ", ".join(f"{number:g}" for number in three)
+            raise SettingError(f"factors of '{name}' are positive numbers, not {numbers}")
         by_hand.append(Scale(segment=name, scales=tuple(map(float, three))))
     measuring.by_hand(by_hand)
     scale_model(copy, measuring.found.factors, mass, preserve_mass_distribution=preserve_mass_distribution)
@@ -111,6 +115,12 @@ def scale(
 
 
 def _measurements(pairs: Pairs) -> list[Measurement]:
+    for name, (_, on) in pairs.items():
+        if not isinstance(on, Mapping):
+            raise SettingError(f"measurement '{name}' is pairs of markers, and by body the axes that they scale")
+        for body, axes in on.items():
+            if not axes or not {*axes.lower()} <= {*"xyz"}:
+                raise SettingError(f"'{axes}' of '{body}' are no axes; write some of XYZ")
     return [
         Measurement(
             name=name,

@@ -70,7 +70,7 @@ def found(words: Iterable[str | Path]) -> list[Path]:
     """Files of setups from names and patterns such as ``subjects/*/setup_ik.xml``, in order, none twice.
 
     Raises:
-        OsimliteError: a pattern matches nothing.
+        OsimliteError: a pattern matches nothing, or a folder is named.
     """
     files: dict[Path, None] = {}
     for word in map(str, words):
@@ -79,6 +79,10 @@ def found(words: Iterable[str | Path]) -> list[Path]:
             if not matches:
                 raise OsimliteError(f"no file matches '{word}'")
             files.update((Path(match), None) for match in matches if Path(match).is_file())
+        elif os.path.isdir(word):
+            raise OsimliteError(
+                f"this is a folder; name the setups in it, as '{os.path.join(word, '*.xml')}'", file=word
+            )
         else:
             files[Path(word)] = None
     return list(files)

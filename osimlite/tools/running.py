@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
@@ -9,7 +10,7 @@ from pathlib import Path
 
 from osimlite._load import module_name
 from osimlite.document.reader import collector_paused, read_any
-from osimlite.errors import DocumentError
+from osimlite.errors import DocumentError, OsimliteError
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report, merged
 from osimlite.lint.engine import run as checked
@@ -65,6 +66,8 @@ def run(
         UnsupportedError: the document is not of a tool that can be run.
         OsimliteError: it could not be carried out; nothing is written then.
     """
+    if not isinstance(setup, str | os.PathLike):
+        raise OsimliteError(f"the file of a setup is wanted here, not a {type(setup).__name__}")
     file = Path(setup)
     top = read_any(file)
     tag = type(top).__name__

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.fitting.marker_data import MarkerData
 from osimlite.simulation.files.storage import read_sto
 from osimlite.simulation.files.trc import write_trc
 from tests.cli.command import run
@@ -56,12 +57,26 @@ def test_a_trial_is_fitted(lab: Path) -> None:
         (("scale", "box.osim", "walk.trc", "--distance", "b=one"), "'one' names no pair of markers for 'b'"),
         (("scale", "box.osim", "--factor", "b=1,2"), "'1,2' are no factors for 'b'"),
         (("scale", "box.osim", "--factor", "c=2"), "'box' has no body 'c'"),
+        (("scale", "box.osim", "--factor", "b=0"), "factors of 'b' are positive numbers, not 0, 0, 0"),
+        (("scale", "box.osim", "--factor", "b=1,-2,1"), "factors of 'b' are positive numbers, not 1, -2, 1"),
+        (("scale", "box.osim", "walk.trc", "--distance", "b.XQ=one:two"), "'XQ' of 'b' are no axes"),
     ],
 )
 def test_what_is_wrong_is_told(lab: Path, words: tuple[str, ...], said: str) -> None:
     done = run(*words, folder=lab)
     assert done.code in (1, 2) and said in done.err, done.err
     assert sorted(path.name for path in lab.iterdir()) == ["box.osim", "walk.trc"]
+
+
+def test_markers_that_do_not_count_and_units_that_cannot_be_right_are_told(lab: Path) -> None:
+    trial = lab / "walk.trc"
+    trial.write_text(trial.read_text().replace("three", "threee"))
+    out = run("ik", "box.osim", "walk.trc", "-o", "out", folder=lab).out
+    assert "of the model, not in the data: three\n" in out and "in the data, not of the model: threee\n" in out
+    assert "units" not in out
+    data = MarkerData.of(trial)
+    write_trc(trial, data.times.tolist(), data.names, (1000.0 * data.positions).reshape(len(data.times), -1).tolist())
+    assert "check the units of the data" in run("ik", "box.osim", "walk.trc", "-o", "out", folder=lab).out
 
 
 def test_a_model_is_scaled(lab: Path) -> None:

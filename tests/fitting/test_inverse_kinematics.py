@@ -178,6 +178,8 @@ def test_what_cannot_be_fitted_is_told() -> None:
         osimlite.inverse_kinematics(model, places, weights={"one": -1.0})
     with pytest.raises(SettingError, match="no frame lies between 7 and 9 s"):
         osimlite.inverse_kinematics(model, places, start=7.0, end=9.0)
+    with pytest.raises(SettingError, match="by their names, not a ndarray"):
+        osimlite.inverse_kinematics(free_body(), np.zeros((4, 3)))  # type: ignore[arg-type]
     with pytest.raises(SettingError, match="as many as all others"):
         osimlite.inverse_kinematics(model, {"one": places["one"], "two": places["two"][:1]})
     with pytest.raises(OsimliteError, match="no coordinate"):

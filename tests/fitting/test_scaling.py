@@ -163,6 +163,8 @@ def test_what_cannot_be_scaled_is_told() -> None:
     model = body_model()
     with pytest.raises(SettingError, match="no body 'tigh'; did you mean 'thigh'"):
         osimlite.scale(model, factors={"tigh": 1.2})
+    with pytest.raises(SettingError, match="measurement 'thigh' is pairs of markers, and by body the axes"):
+        osimlite.scale(model, {}, measurements={"thigh": ([("one", "two")], ["thigh"])})  # type: ignore[arg-type]
     with pytest.raises(SettingError, match="there are no markers of it"):
         osimlite.scale(model, measurements=LENGTH)
     notes = osimlite.scale(model, {"top": STATIC["top"]}, measurements=LENGTH).measured

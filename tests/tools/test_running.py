@@ -85,6 +85,15 @@ def test_what_a_setup_names_is_checked_too(setup: Path) -> None:
         osimlite.run(setup, check=False)
 
 
+def test_only_files_are_run(setup: Path) -> None:
+    """Neither a list, nor an object, nor a folder, for which the command shows how to write its setups."""
+    for wrong in ([setup], osimlite.read_document(setup)):
+        with pytest.raises(OsimliteError, match=rf"the file of a setup is wanted here, not a {type(wrong).__name__}"):
+            osimlite.run(wrong)  # type: ignore[arg-type]
+    done = run("run", ".", folder=setup.parent)
+    assert done.code == 2 and ".: this is a folder; name the setups in it, as './*.xml'" in done.err
+
+
 @pytest.mark.parametrize("tag", ["CMCTool", "RRATool", "MocoStudy", "IKTaskSet", "Model"])
 def test_what_cannot_be_run_is_refused_by_name(setup: Path, tag: str) -> None:
     setup.write_text(f'<OpenSimDocument Version="40600"><{tag} name="it"/></OpenSimDocument>')
