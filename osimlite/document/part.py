@@ -1,4 +1,4 @@
-"""Documents that hold something else than a model and may say nothing unknown, such as the loads of a trial."""
+"""Documents that hold something else than a model and may say nothing misspelt, such as the loads of a trial."""
 
 from __future__ import annotations
 
@@ -9,20 +9,23 @@ from osimlite.document.reader import read_document
 from osimlite.document.source import Source
 from osimlite.errors import DocumentError
 from osimlite.schema.base import Object
+from osimlite.schema.specs import field_specs
+from osimlite.text import nearest
 
 AnyObject = TypeVar("AnyObject", bound=Object)
 
 
 def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
-    """Read a document that holds one object of a class.
+    """Read a document that holds one object of a class; what is like nothing of that class is ignored, as in OpenSim.
 
     Raises:
         DocumentError: the file is missing or holds something else; with line and column.
     """
     document = read_document(Source.of_file(path), of=cls)
-    bad = next((note for note in document.notes if note.kind == "unknown-tag"), None)
-    if bad is not None:
-        place = document.source.of_tag(bad.number)
-        raise document.source.fault(DocumentError, f"<{bad.word}> means nothing in this document", place)
+    for note in document.notes:
+        # Properties of older versions are still in many files; what is like one of today is misspelt.
+        if note.kind == "unknown-tag" and note.owner and (near := nearest(note.word, field_specs(type(note.owner)))):
+            told = f"<{note.word}> means nothing in this document; did you mean <{near}>?"
+            raise document.source.fault(DocumentError, told, document.source.of_tag(note.number))
     assert isinstance(document.top, cls)
     return document.top

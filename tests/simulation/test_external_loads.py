@@ -117,3 +117,16 @@ def test_a_measured_force_without_data_is_refused(model):
     model.force_set.objects.append(ExternalForce(name="lost", applied_to_body="block", force_identifier="f"))
     with pytest.raises(UnsupportedError, match=r"'/forceset/lost' \(ExternalForce outside of ExternalLoads"):
         simulate(model, 0.01)
+
+
+def test_what_older_versions_asked_for_is_ignored_and_what_is_misspelt_refused(model, tmp_path):
+    """As the public files of Rajagopal2016 have it."""
+    data(tmp_path, np.ones((2, 9)))
+    path = document(tmp_path, force(), version=30000)
+    old = "<external_loads_model_kinematics_file>ik.mot</external_loads_model_kinematics_file>"
+    old += "<lowpass_cutoff_frequency_for_load_kinematics>6</lowpass_cutoff_frequency_for_load_kinematics>"
+    path.write_text(path.read_text().replace("<datafile>", f"{old}<datafile>"))
+    assert len(read_external_loads(build_mechanism(model), path)) == 1
+    path.write_text(path.read_text().replace("force_identifier", "force_identifer"))
+    with pytest.raises(DocumentError, match=r"<force_identifer> means nothing .* mean <force_identifier>"):
+        read_external_loads(build_mechanism(model), path)

@@ -113,7 +113,7 @@ def loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> StoTabl
         DocumentError: they name no data file, or it cannot be read.
     """
     name = loads.datafile.strip()
-    if not name:
+    if name in ("", "Unassigned"):
         raise DocumentError("it names no data file; give it a <datafile>", file=file)
     path = beside(folder, name)
     return read_c3d_forces(path) if path.suffix.lower() == ENDING else read_sto(path)
