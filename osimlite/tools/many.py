@@ -14,11 +14,9 @@ from typing import Any
 
 from osimlite.errors import OsimliteError
 from osimlite.files import write_atomically
-from osimlite.lint.config import Config
-from osimlite.lint.engine import subject_of
-from osimlite.lint.setup import Setup
 from osimlite.records import dataclass, field
 from osimlite.text import counted, listed
+from osimlite.tools.named_files import named_files
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.running import run
 
@@ -188,27 +186,10 @@ def _plain(summary: dict[str, Any]) -> dict[str, Any]:
     return plain
 
 
-def _named(setup: str, rule: str, passed: frozenset[str] = frozenset()) -> Iterator[str]:
-    """Files that a setup, and the documents that it names, names by a rule of names."""
-    subject = subject_of(setup, Config())
-    if not isinstance(subject, Setup):
-        return
-    for item in subject.named_files("file" if rule == "file" else rule):
-        if rule == "file":
-            yield item.path
-        else:
-            folder = os.path.dirname(setup)
-            yield os.path.join(folder, item.name.strip())
-            yield os.path.join(folder, str(getattr(subject.top, "results_directory", "")).strip(), item.name.strip())
-    for item in subject.named_files("file"):
-        if item.path.lower().endswith(".xml") and item.path not in passed and os.path.isfile(item.path):
-            yield from _named(item.path, rule, passed | {setup})
-
-
 def digest_of(setup: Path) -> str:
     """Of the contents of a setup and of all files that it names."""
     made = blake2b(digest_size=16)
-    for path in dict.fromkeys((str(setup), *_named(str(setup), "file"))):
+    for path in dict.fromkeys((str(setup), *named_files(str(setup), "file"))):
         made.update(path.encode("utf-8", "surrogateescape"))
         try:
             made.update(Path(path).read_bytes())
@@ -336,10 +317,10 @@ def _needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
     """Which other setups make what a setup names, by the names of files in them; never two each other's."""
     makers: dict[str, Path] = {}
     for setup in setups:
-        makers.update((os.path.realpath(name), setup) for name in _named(str(setup), "output-file"))
+        makers.update((os.path.realpath(name), setup) for name in named_files(str(setup), "output-file"))
     needs: dict[Path, list[Path]] = {}
     for setup in setups:
-        names = {os.path.realpath(name) for name in _named(str(setup), "file")}
+        names = {os.path.realpath(name) for name in named_files(str(setup), "file")}
         needs[setup] = list({makers[name]: None for name in sorted(names & makers.keys()) if makers[name] != setup})
     # What goes round in a circle is run in the order that was given.
     done: set[Path] = set()

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from osimlite.errors import SimulationError
+from osimlite.errors import DocumentError, SimulationError
 from osimlite.files import make_folder, written_atomically
 from osimlite.lint.diagnostic import Finding
 from osimlite.records import dataclass, field, replace
 from osimlite.simulation.files.old_storage import PRECISION, printed
 from osimlite.simulation.files.storage import StoTable, adapter_lines
 from osimlite.tools.evidence import Evidence
+from osimlite.tools.named_files import is_input
 
 DYNAMICS = "Inverse Dynamics Generalized Forces"
 """The name of the table that inverse dynamics gives."""
@@ -84,16 +86,31 @@ class Outcome:
                 row, place = np.argwhere(odd)[0]
                 raise _endless(f"'{table.columns[place]}' is {table.rows[row, place]}", table.times[row])
 
-    def write(self) -> None:
-        """Write what is still to be written, each file whole or not at all.
+    def _require_inputs_kept(self, setup: Path) -> None:
+        """Refuse to write over what the results come from. A model may take the place of the one it was made of."""
+        for path in self._texts:
+            if (path.name in self.tables or path.suffix.lower() != ".osim") and is_input(path, setup):
+                told = f"a result would replace '{path}', which it is computed from; give it another name or place"
+                raise DocumentError(told, file=str(setup))
+
+    def write(self, setup: Path) -> None:
+        """Write what is still to be written, all files whole or none of them.
+
+        Args:
+            setup: that all comes from.
 
         Raises:
-            OsimliteError: a file cannot be written, or results are no numbers any more; then nothing is written.
+            OsimliteError: a file cannot be written or is one of the setup's own, or results are no numbers any more;
+                then nothing is written.
         """
         self._require_numbers()
-        for path, lines in self._texts.items():
-            make_folder(path.parent)
-            with written_atomically(path) as stream:
+        self._require_inputs_kept(setup)
+        with ExitStack() as all_or_none:
+            # They are put in their places in the end, the last first: of one place the last one stays.
+            for path, lines in reversed(self._texts.items()):
+                make_folder(path.parent)
+                stream = all_or_none.enter_context(written_atomically(path))
                 stream.writelines(line.encode() for line in lines)
-            self.files.append(path)
+                stream.close()
+        self.files += self._texts
         self._texts.clear()

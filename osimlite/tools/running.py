@@ -83,8 +83,12 @@ def run(
         if tell is not None and misspelt:
             tell(Report(misspelt, report.texts))
     tool = import_module(f"{__package__}.{module_name(tag)}")
-    tool.run(Job(top, file, None if output is None else Path(output)), outcome)
-    outcome.write()
+    try:
+        tool.run(Job(top, file, None if output is None else Path(output)), outcome)
+        outcome.write(file)
+    except OsimliteError as error:
+        error.file = error.file or str(file)
+        raise
     return outcome
 
 
