@@ -122,7 +122,7 @@ def expect_folder_of(path: str | Path) -> None:
     Raises:
         OsimliteError: it is not.
     """
-    if not Path(os.path.realpath(path)).parent.is_dir():
+    if not os.path.isdir(os.path.dirname(os.path.realpath(path))):
         raise _nowhere(path)
 
 
@@ -157,11 +157,13 @@ def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
     """
     # A link stays a link to the file that is written; a pipe or a device takes the text as it is.
     target = Path(os.path.realpath(path))
-    if target.exists() and not target.is_file():
+    # Unlike those of Path, these take a name that is too long for one that is not there.
+    is_there = os.path.exists(target)
+    if is_there and not target.is_file():
         with _opened(target) as stream:
             yield stream
         return
-    there = target.stat() if target.exists() else None
+    there = target.stat() if is_there else None
     # To those who may do everything the mode says it all the same.
     if there is not None and not (there.st_mode & 0o222 and os.access(target, os.W_OK)):
         raise OsimliteError("cannot write the file: it is read-only; make it writable first", file=str(target))
@@ -217,7 +219,9 @@ def make_folder(path: str | Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        file = next((place for place in (folder, *folder.parents) if place.exists() and not place.is_dir()), None)
+        file = next(
+            (place for place in (folder, *folder.parents) if os.path.exists(place) and not place.is_dir()), None
+        )
         reason = "this is a file, not a folder" if file is not None else error.strerror
         raise OsimliteError(f"cannot make a folder here: {reason}", file=str(file or folder)) from None
     return folder
@@ -230,7 +234,7 @@ def folder_to_fill(path: str | Path) -> Iterator[Path]:
     Raises:
         OsimliteError: it cannot be made or written to; the message says why.
     """
-    is_new = not Path(path).exists()
+    is_new = not os.path.exists(path)
     folder = make_folder(path)
     if not os.access(folder, os.W_OK):
         raise OsimliteError("cannot write here: permission denied", file=str(folder))

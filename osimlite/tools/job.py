@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,7 @@ class Job:
         if name in NONE:
             return None
         there, here = self.file.parent / name, Path(name)
-        return here if not there.exists() and here.exists() else there
+        return here if not os.path.exists(there) and os.path.exists(here) else there
 
     def needed(self, *tags: str) -> Path:
         """The file that one of some properties names.

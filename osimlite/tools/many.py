@@ -6,6 +6,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from glob import glob, has_magic
 from hashlib import blake2b
@@ -72,7 +73,7 @@ def found(words: Iterable[str | Path]) -> list[Path]:
     """
     files: dict[Path, None] = {}
     for word in map(str, words):
-        if has_magic(word) and not Path(word).exists():
+        if has_magic(word) and not os.path.exists(word):
             matches = sorted(glob(word, recursive=True))
             if not matches:
                 raise OsimliteError(f"no file matches '{word}'")
@@ -205,19 +206,18 @@ class _Journal:
         self.path, self.noted = folder / JOURNAL, dict[str, Trial]()
         self._saved, self._is_kept = time.monotonic(), is_kept
         if resume and self.path.is_file():
-            for line in self.path.read_text(encoding="utf-8").splitlines():
-                try:
+            for line in self.path.read_bytes().splitlines():
+                # What is damaged is done again.
+                with suppress(ValueError, TypeError):
                     trial = Trial(**json.loads(line))
-                except (ValueError, TypeError):
-                    continue
-                self.noted[trial.setup] = trial
+                    self.noted[trial.setup] = trial
 
     def done(self, setup: Path) -> Trial | None:
         """What is noted of a setup, if all is still as it was."""
         trial = self.noted.get(str(setup))
-        if trial is None or trial.status not in (DONE, NO) or not all(map(os.path.isfile, trial.files)):
+        if trial is None or trial.status not in (DONE, NO) or trial.digest != digest_of(setup):
             return None
-        if trial.digest != digest_of(setup):
+        if not all(map(os.path.isfile, trial.files)):
             return None
         trial.was_done = True
         return trial
@@ -225,7 +225,9 @@ class _Journal:
     def note(self, trial: Trial) -> None:
         self.noted[trial.setup] = trial
         if time.monotonic() - self._saved > SAVE_SECONDS:
-            self.save()
+            # Where nothing can be noted, as beside setups that may only be read, the work goes on all the same.
+            with suppress(OsimliteError):
+                self.save()
 
     def save(self) -> None:
         """Write it, if there is anything to write."""
@@ -236,10 +238,11 @@ class _Journal:
 
     def end(self, trials: Sequence[Trial]) -> None:
         """Nothing is left to do, or something that failed may be done later."""
-        if all(trial.status in (DONE, NO) for trial in trials):
-            self.path.unlink(missing_ok=True)
-        else:
-            self.save()
+        with suppress(OsimliteError, OSError):
+            if all(trial.status in (DONE, NO) for trial in trials):
+                self.path.unlink(missing_ok=True)
+            else:
+                self.save()
 
 
 class _Work:

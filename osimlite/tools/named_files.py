@@ -30,7 +30,7 @@ def named_files(setup: str, rule: str, passed: frozenset[str] = frozenset()) -> 
 
 def is_input(path: Path, setup: Path) -> bool:
     """Whether a file is a setup or one that it takes something from, by whatever name or link."""
-    if not path.is_file():
+    if not os.path.isfile(path):
         return False
     inputs = (str(setup), *named_files(str(setup), "file"))
     return any(os.path.isfile(name) and os.path.samefile(path, name) for name in inputs)

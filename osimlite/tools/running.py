@@ -110,7 +110,7 @@ def _reports(file: str, passed: frozenset[str] = frozenset()) -> Iterator[Report
     if isinstance(subject, Setup):
         for naming in subject.named_files("file"):
             path = Path(naming.path)
-            if naming.path in passed or not path.is_file() or not _is_checked(naming.path):
+            if naming.path in passed or not os.path.isfile(path) or not _is_checked(naming.path):
                 continue
             yield from _reports(naming.path, passed | {file})
 

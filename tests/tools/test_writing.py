@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 import osimlite
 from osimlite.errors import OsimliteError
+from osimlite.tools.many import JOURNAL
 from tests.cli.command import run
 from tests.tools.test_damaged import laid_out, state
 
@@ -81,3 +83,35 @@ def test_an_error_of_a_tool_names_its_setup(trial: Path) -> None:
     change(trial / "analyze.xml", "_coordinates>6<", "_coordinates>0<")
     with pytest.raises(OsimliteError, match=r"analyze\.xml: a low-pass frequency is a positive number"):
         osimlite.run(trial / "analyze.xml")
+
+
+@pytest.mark.parametrize(
+    "noted",
+    [
+        b"\xff\xfe{}\n",
+        b'[]\nnull\n{"setup": [], "status": "done"}\n{"setup": "id.xml", "status": "done", "files": 3}\n',
+    ],
+)
+def test_a_note_that_is_damaged_is_no_note(trial: Path, noted: bytes) -> None:
+    (trial / JOURNAL).write_bytes(noted)
+    done = run("run", "z_ik.xml", "id.xml", "--resume", folder=trial)
+    assert (done.code, done.err) == (0, "") and done.out.endswith("2 setups: 2 done\n")
+    assert not (trial / JOURNAL).exists()
+
+
+def test_what_cannot_be_noted_is_done_all_the_same(trial: Path) -> None:
+    (trial / JOURNAL).mkdir()
+    change(trial / "id.xml", ">id.sto<", ">ik.mot<")
+    done = run("run", "z_ik.xml", "id.xml", folder=trial)
+    assert done.code == 2 and done.out.endswith("2 setups: 1 done, 1 failed\n")
+
+
+@pytest.mark.parametrize("place", ["name", "results_directory", "coordinates_file", "model_file"])
+def test_names_that_are_too_long_are_told(trial: Path, place: str) -> None:
+    text, long = (trial / "analyze.xml").read_text(), 260 * "x"
+    new = re.sub(f'{place}="an"', f'{place}="{long}"', text)
+    new = re.sub(f"<{place}>.*?<", f"<{place}>{long}<", new) if new == text else new
+    (trial / "analyze.xml").write_text(new)
+    for check in (True, False):
+        with pytest.raises(OsimliteError, match=r"File name too long|no such file|is not there"):
+            osimlite.run(trial / "analyze.xml", check=check)

@@ -7,7 +7,7 @@ import os
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.setup import UNGIVEN, Naming, Setup, content_of, is_given, motion_of
 from osimlite.lint.suffixes import is_table
-from osimlite.lint.words import called
+from osimlite.lint.words import a, called
 from osimlite.schema.specs import file_specs
 from osimlite.schema.tree import is_a
 
@@ -86,7 +86,7 @@ def missing_input(setup: Setup, found: FindingSink) -> None:
 def _in_other_case(naming: Naming) -> str | None:
     folder, last = os.path.split(naming.path)
     try:
-        twin = next((name for name in os.listdir(folder or ".") if name.lower() == last.lower()), None)
+        twin = next((name for name in os.listdir(folder or ".") if name.lower() == last.lower() and name != last), None)
     except OSError:
         return None
     return None if twin is None else naming.name[: len(naming.name) - len(last)] + twin
@@ -123,7 +123,7 @@ def input_of_another_kind(setup: Setup, found: FindingSink) -> None:
                 )  # fmt: skip
         elif wanted[:1].isupper():
             top = None if is_table(naming.name) else setup.document(naming.name)
-            held = "a table" if top is None else f"a {type(top).__name__}"
+            held = "a table" if top is None else a(type(top).__name__)
             if is_table(naming.name) or (top is not None and not is_a(top, wanted)):
                 found(
                     f"{naming.spec.tag} of {called(naming.item)} must hold a {wanted}, '{naming.name}' holds {held}",
