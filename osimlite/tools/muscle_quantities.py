@@ -11,6 +11,7 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.muscles import (
     DeGrooteFregly2016Muscle,
     MeyerFregly2016Muscle,
+    Millard2012AccelerationMuscle,
     Millard2012EquilibriumMuscle,
     Muscle,
     RigidTendonMuscle,
@@ -25,6 +26,10 @@ from osimlite.simulation.elements.muscle import SPRING
 KNOWN = ("tension", "fiber_length", "cos_pennation", "active_fiber_force", "passive_fiber_force", "length", "rate",
          "fiber_velocity")  # fmt: skip
 """What all laws record, and is needed here."""
+
+OF_DYNAMICS = ("FiberVelocity", "NormFiberVelocity", "PennationAngularVelocity", "FiberActivePower",
+               "FiberPassivePower", "TendonPower", "MuscleActuatorPower")  # fmt: skip
+"""Tables without numbers for a model without mass, whose dynamics OpenSim does not compute."""
 
 Tables = dict[str, Array]
 """Rows (t, m) for m muscles, by the ends of the names of MuscleAnalysis' files."""
@@ -85,6 +90,14 @@ def _still(found: Tables, is_rigid: Sequence[bool]) -> Tables:
     return {"TendonPower": np.where(is_rigid, 0.0, found["TendonPower"])}
 
 
+def _accelerated(found: Tables, muscles: Sequence[Any]) -> Tables:
+    """What damps the fibers is part of their force, and the power of the mass at their end of the passive one."""
+    damping = [muscle.fiber_damping * muscle.max_isometric_force / muscle.optimal_fiber_length for muscle in muscles]
+    damped = found["FiberVelocity"] * np.array(damping)
+    along = found["MuscleActuatorPower"] - found["TendonPower"]
+    return {"FiberForce": found["FiberForce"] + damped, "FiberPassivePower": along - found["FiberActivePower"]}
+
+
 def _degroote(found: Tables, muscles: Sequence[Any]) -> Tables:
     """Fibers that point the other way have the angle of those that do not, which turns as if they did."""
     angle = np.minimum(found["PennationAngle"], np.pi - found["PennationAngle"])
@@ -108,6 +121,7 @@ def _old(found: Tables, muscles: Sequence[Any]) -> Tables:
 
 
 CHECKED: dict[type[Muscle], Callable[[Tables, Sequence[Any]], Tables]] = {
+    Millard2012AccelerationMuscle: _accelerated,
     Millard2012EquilibriumMuscle: _millard,
     Thelen2003Muscle: _thelen,
     DeGrooteFregly2016Muscle: _degroote,

@@ -21,7 +21,7 @@ from osimlite.schema.frames import Body, Frame
 from osimlite.schema.joints import Joint
 from osimlite.schema.markers import Station
 from osimlite.schema.model import Model
-from osimlite.schema.muscles import Muscle
+from osimlite.schema.muscles import Millard2012AccelerationMuscle, Muscle
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.simulation.elements.muscle import SPRING
@@ -41,6 +41,7 @@ def reader_of(motion: Motion, component: Component, name: str) -> Reader | None:
             return found
     path = motion.model.tree().path_of(component) or ""
     known = name not in LAWS or (isinstance(component, Muscle) and motion.system.knows(path, LAWS[name]))
+    known &= name not in OTHERWISE.get(type(component), ())
     if isinstance(component, Muscle) and type(component) in CHECKED and name in MUSCLES and known:
         return lambda motion, muscle, path: _of_muscle(motion, muscle, path, MUSCLES[name])
     if f"{path}/{name}" in motion.histories:
@@ -249,6 +250,11 @@ LAWS = {
     "passive_fiber_elastic_force_along_tendon": SPRING,
 }
 """What the law of a muscle must record for some of them."""
+
+OTHERWISE: dict[type[Component], tuple[str, ...]] = {
+    Millard2012AccelerationMuscle: ("fiber_force_along_tendon", "tendon_force"),
+}
+"""Those that a class computes in another way, which is not known here: with a mass, the tendon's is without damping."""
 
 READERS: dict[type[Component], dict[str, Reader]] = {
     Model: {name: _of_system(name) for name in SYSTEM} | {"potential_energy": _potential_energy},

@@ -14,6 +14,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import (
     DeGrooteFregly2016Muscle,
     MeyerFregly2016Muscle,
+    Millard2012AccelerationMuscle,
     Millard2012EquilibriumMuscle,
     Muscle,
     RigidTendonMuscle,
@@ -38,6 +39,7 @@ CLASSES: dict[str, tuple[type[Muscle], dict[str, Any]]] = {
     "millard": (Millard2012EquilibriumMuscle, {}),
     "millard, rigid tendon": (Millard2012EquilibriumMuscle, {"ignore_tendon_compliance": True}),
     "millard, damping that does not count": (Millard2012EquilibriumMuscle, {"fiber_damping": 0.0005}),
+    "millard, with a mass": (Millard2012AccelerationMuscle, {"default_activation": 0.3, "fiber_damping": 0.2}),
     "thelen": (Thelen2003Muscle, {}),
     "thelen, shortest fibers": (Thelen2003Muscle, {"default_fiber_length": 0.001}),
     "degroote": (DeGrooteFregly2016Muscle, {"fiber_damping": 0.1}),
@@ -85,6 +87,16 @@ def test_classes(
     others = OTHERS.format(muscle="BRA TRIlong", coordinate="r_elbow_flex")
     more = MORE.format(equilibrium=equilibrium, others=others)
     compare(*both(tmp_path, with_muscles_of(model, *CLASSES[case]), "AnalyzeTool", more))
+
+
+def test_no_dynamics_without_mass(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    model = osimlite.read(next(item.path for item in corpus if item.id == "m0001"))
+    for body in model.body_set.objects:
+        body.mass = 0.0
+    ours, theirs = both(tmp_path, model, "AnalyzeTool", MORE.format(equilibrium="true", others=""))
+    compare(ours, theirs)
+    assert np.isnan(read_sto(theirs / "it_M_FiberVelocity.sto").rows).all()
 
 
 @pytest.mark.parametrize("name", ["gait10_subject01", "gait2354_subject01_simbody"])

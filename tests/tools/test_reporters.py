@@ -15,7 +15,7 @@ import osimlite
 from osimlite.models.jumper import jumper
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
 from osimlite.schema.model import Model
-from osimlite.schema.muscles import Millard2012AccelerationMuscle, Muscle, RigidTendonMuscle
+from osimlite.schema.muscles import Muscle, RigidTendonMuscle
 from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated
 from osimlite.schema.probe_types import ActuatorPowerProbe
 from osimlite.simulation.files.storage import StoTable, write_sto
@@ -93,7 +93,6 @@ def test_muscles_of_several_classes_stand_in_their_order(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("cls", "more"),
     [
-        (Millard2012AccelerationMuscle, {}),
         # OpenSim writes no numbers for most of its tables.
         (Delp1990Muscle_Deprecated, {}),
         (RigidTendonMuscle, {"appliesForce": False}),

@@ -11,7 +11,7 @@ from osimlite.simulation.elements.muscle import SPRING
 from osimlite.simulation.files.old_storage import UNITS
 from osimlite.simulation.paths import Paths
 from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.muscle_quantities import CHECKED, KNOWN, quantities
+from osimlite.tools.muscle_quantities import CHECKED, KNOWN, OF_DYNAMICS, quantities
 from osimlite.tools.not_runnable import NotRunnable
 
 _DESCRIPTION = (
@@ -33,6 +33,8 @@ def compute(analysis: MuscleAnalysis, motion: Motion, tables: Tables) -> None:
             raise NotRunnable(told, file=str(tables.job.file))
     names = [muscle.name for muscle in muscles]
     found = _of_all(motion, muscles)
+    if not motion.mechanism.total_mass > np.finfo(float).eps:
+        found |= {suffix: np.full_like(found[suffix], np.nan) for suffix in OF_DYNAMICS}
     for suffix, rows in found.items():
         tables.add(suffix, suffix, names, rows, description=_DESCRIPTION)
     if analysis.compute_moments:
