@@ -41,12 +41,15 @@ class Measuring:
 
     Args:
         model: the generic one.
+
+    Attributes:
+        mechanism: of it.
     """
 
     def __init__(self, model: Model) -> None:
-        self._model, self._mechanism = model, build_mechanism(model)
-        self._stations = marker_stations(model, self._mechanism)
-        self._state = self._mechanism.at(_default(self._mechanism))
+        self._model, self.mechanism = model, build_mechanism(model)
+        self._stations = marker_stations(model, self.mechanism)
+        self._state = self.mechanism.at(_default(self.mechanism))
         names = [frame.name for frame in model.components(PhysicalFrame)]
         self.found = Measured({name: [1.0, 1.0, 1.0] for name in names}, {}, [])
         self.frames = names

@@ -107,7 +107,8 @@ def scale(
             raise SettingError(f"factors of '{name}' are positive numbers, not {numbers}")
         by_hand.append(Scale(segment=name, scales=tuple(map(float, three))))
     measuring.by_hand(by_hand)
-    scale_model(copy, measuring.found.factors, mass, preserve_mass_distribution=preserve_mass_distribution)
+    found, mechanism = measuring.found, measuring.mechanism
+    scale_model(copy, found.factors, mass, preserve_mass_distribution=preserve_mass_distribution, mechanism=mechanism)
     result = Scaled(copy, measuring.found)
     if place and data is not None:
         result.placed = place_markers(copy, data, tasks, start, end)
@@ -182,8 +183,9 @@ def _scaled(tool: ScaleTool, model: Model, folder: Path) -> Measured:
             near = did_you_mean(word, (MEASUREMENTS, BY_HAND))
             raise SettingError(f"scaling_order has '{word}'; it consists of {MEASUREMENTS} and {BY_HAND}{near}")
     keeps = scaler.preserve_mass_distribution
-    scale_model(model, measuring.found.factors, tool.mass, preserve_mass_distribution=keeps)
-    return measuring.found
+    found, mechanism = measuring.found, measuring.mechanism
+    scale_model(model, found.factors, tool.mass, preserve_mass_distribution=keeps, mechanism=mechanism)
+    return found
 
 
 def add_markers(model: Model, path: Path) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from osimlite.errors import ModelError
 from osimlite.multibody import build_mechanism
+from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.schema_frames import Placements
 from osimlite.multibody.spatial import Array, rotation_xyz
 from osimlite.schema.base import Component
@@ -38,7 +39,12 @@ TRANSLATIONS = ("translation1", "translation2", "translation3")
 
 
 def scale_model(
-    model: Model, factors: Factors, mass: float = -1.0, *, preserve_mass_distribution: bool = False
+    model: Model,
+    factors: Factors,
+    mass: float = -1.0,
+    *,
+    preserve_mass_distribution: bool = False,
+    mechanism: Mechanism | None = None,
 ) -> None:
     """Scale a model, as OpenSim's Model::scale does.
 
@@ -52,13 +58,15 @@ def scale_model(
         mass: what all bodies together are to weigh, kg; if it is not positive that follows from the factors.
         preserve_mass_distribution: let the bodies keep their shares of the mass, instead of weighing more where they
             are larger.
+        mechanism: of the model as it is; made if left out.
 
     Raises:
         ModelError: a coupler binds a translation to a body that is scaled in one direction more than in another.
         OsimliteError: the paths of the model cannot be computed.
     """
-    before = path_lengths(model)
-    scaler = _Scaler(model, factors)
+    mechanism = build_mechanism(model) if mechanism is None else mechanism
+    before = path_lengths(model, mechanism)
+    scaler = _Scaler(model, factors, mechanism)
     for component in scaler.tree.components:
         if not scaler.tree.is_internal(component):
             scaler.scale(component)
@@ -72,7 +80,7 @@ def scale_model(
             for body in model.components(Body):
                 body.mass *= mass / total
                 body.inertia = tuple(mass / total * item for item in body.inertia)  # type: ignore[assignment]
-    after = path_lengths(model)
+    after = path_lengths(model) if before else {}
     for path, length in before.items():
         if length > 0.0:
             owner = model[path]
@@ -81,14 +89,14 @@ def scale_model(
                     setattr(owner, name, getattr(owner, name) * (after[path] / length))
 
 
-def path_lengths(model: Model) -> dict[str, float]:
+def path_lengths(model: Model, mechanism: Mechanism | None = None) -> dict[str, float]:
     """Length of each path in the default pose, m, by the component paths of their owners that have a rule for it."""
     owners = [item for item in model.components() if PATH in scales(type(item)).values()]
     if not owners:
         return {}
     from osimlite.simulation.paths import paths
 
-    found = paths(model)
+    found = paths(model, mechanism=mechanism)
     lengths = found.lengths(found.mechanism.assemble({}))
     return {path: lengths[path] for path in (item.path for item in owners) if path in lengths}
 
@@ -140,14 +148,14 @@ def _same(one: float, two: float) -> bool:
 class _Scaler:
     """Multiplies properties of components by the factors of the bodies that they are fixed to."""
 
-    def __init__(self, model: Model, factors: Factors) -> None:
+    def __init__(self, model: Model, factors: Factors, mechanism: Mechanism) -> None:
         self.tree = model.tree()
         self.placements = Placements(self.tree)
         self.factors = {name: np.array(given, dtype=float) for name, given in factors.items()}
         # What frames lead to does not change while they are scaled.
         for frame in model.components(PhysicalFrame):
             self.placements.frame(frame)
-        self.mechanism = build_mechanism(model)
+        self.mechanism = mechanism
 
     def of_base(self, frame: PhysicalFrame) -> Array | None:
         """The factors of the body (or ground) that a frame is fixed to, None if that stays as it is."""

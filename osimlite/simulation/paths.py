@@ -14,7 +14,7 @@ from osimlite.multibody.constraints import Constraint, Lock
 from osimlite.multibody.extremes import any_numbers, methods_of_any_numbers
 from osimlite.multibody.kinematics import Kinematics, kinematics
 from osimlite.multibody.linear import shortest, stacked
-from osimlite.multibody.mechanism import Values
+from osimlite.multibody.mechanism import Mechanism, Values
 from osimlite.multibody.spatial import Array
 from osimlite.schema.base import Component
 from osimlite.schema.model import Model
@@ -34,19 +34,20 @@ ROUNDING = 1e-12
 
 
 @any_numbers
-def paths(model: Model, wrapping: str = OPENSIM) -> Paths:
+def paths(model: Model, wrapping: str = OPENSIM, mechanism: Mechanism | None = None) -> Paths:
     """The paths of a model: of its muscles, ligaments, springs and actuators, whether these act or not.
 
     Args:
         model: whose paths.
         wrapping: "opensim", or "geodesic": see :class:`osimlite.simulation.Options`.
+        mechanism: of the model, if somebody has it.
 
     Raises:
         SettingError: there is no such wrapping.
         UnsupportedError: a path, a joint or a constraint of an unknown class.
         ModelError: something makes no sense.
     """
-    return Paths(model, wrapping)
+    return Paths(model, wrapping, mechanism=mechanism)
 
 
 @methods_of_any_numbers
@@ -61,6 +62,7 @@ class Paths:
         wrapping: how they bend around surfaces.
         code: what runs the kernels; the best that is installed if left out.
         left_out: paths of owners whose paths are not wanted.
+        mechanism: of the model; made if left out.
 
     Attributes:
         system: that computes them.
@@ -72,9 +74,14 @@ class Paths:
     _repr_html_ = shown_in_notebooks("paths")
 
     def __init__(
-        self, model: Model, wrapping: str = OPENSIM, code: Code | None = None, left_out: Container[str] = ()
+        self,
+        model: Model,
+        wrapping: str = OPENSIM,
+        code: Code | None = None,
+        left_out: Container[str] = (),
+        mechanism: Mechanism | None = None,
     ) -> None:
-        mechanism = build_mechanism(model)
+        mechanism = build_mechanism(model) if mechanism is None else mechanism
         builder = ElementBuilder(model, mechanism, Path(), wrapping=wrapping)
         owners = filter(_has_path, builder.tree.components)
         self._gather(builder, [owner for owner in owners if builder.path(owner) not in left_out], code)
