@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,7 +15,7 @@ from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.layout import Include, Layout, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model, expect_model
-from osimlite.schema.specs import FieldSpec, field_specs
+from osimlite.schema.specs import FieldSpec, defaults, field_specs
 
 Numbers = Literal["shortest", "opensim"]
 DECLARATION = '<?xml version="1.0" encoding="UTF-8" ?>'
@@ -91,9 +92,15 @@ class _Printer:
                 self._block(layout.defaults, depth + 1)
             present = item.model_fields_set
             default = self.defaults.get(type(item))
+            # What nobody has asked for is no part of the object yet, and need not become one to say nothing.
+            silent = defaults(type(item))[1].keys() - item.__dict__.keys() - present if default is None else set()
+            if silent:
+                silent &= _silent(type(item))
             for spec in field_specs(type(item)).values():
                 if layout is not None and layout.before and spec.tag in layout.before:
                     self._remarks(layout.before[spec.tag], depth + 1)
+                if spec.name in silent and (layout is None or spec.name not in layout.inherited):
+                    continue
                 value = getattr(item, spec.name)
                 if (
                     spec.name in present
@@ -191,6 +198,14 @@ class _Printer:
         if self.comments:
             indent = "\t" * depth
             self.lines.extend(f"{indent}<!--{text}-->" for text in texts)
+
+
+@cache
+def _silent(cls: type[Object]) -> frozenset[str]:
+    """The properties of a class whose objects and lists, as they are made for it, are not printed."""
+    made = defaults(cls)[1]
+    held = (spec for spec in field_specs(cls).values() if spec.name in made and isinstance(spec.kind, Held))
+    return frozenset(spec.name for spec in held if not has_content(made[spec.name](), spec))
 
 
 def has_content(value: Any, spec: FieldSpec | None = None) -> bool:
