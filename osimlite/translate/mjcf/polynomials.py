@@ -17,6 +17,8 @@ DEGREE = 4
 """Of the polynomials in an equality of MuJoCo."""
 
 _SAMPLES = 400
+_MOST = 1e100
+"""Of the values of functions: their squares are numbers too."""
 _WIDEST = 4.0 * np.pi
 """A range (rad, m) that is wider is taken for one that nobody meant."""
 
@@ -84,8 +86,15 @@ def quartic(function: f.Function, span: tuple[float, float], unit: str) -> Fit:
 
 
 def sampled(function: f.Function, x: Array) -> Array:
-    """Values of a function of one argument at many."""
-    return np.array([function.evaluate(np.array((value,)))[0] for value in x])
+    """Values of a function of one argument at many.
+
+    Raises:
+        FloatingPointError: they are too large to fit anything to.
+    """
+    values = np.array([function.evaluate(np.array((value,)))[0] for value in x])
+    if not (np.abs(values) < _MOST).all():
+        raise FloatingPointError("a function has values that nothing can be fitted to")
+    return values
 
 
 def span(function: f.Function, limits: tuple[float, float], start: float) -> tuple[float, float]:

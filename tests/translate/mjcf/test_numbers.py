@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 import osimlite
-from osimlite import Body, Coordinate, Model, PinJoint
+from osimlite import Body, Coordinate, CoordinateCouplerConstraint, Model, PinJoint
 from osimlite.errors import OsimliteError
 from osimlite.schema.base import Object
+from osimlite.schema.functions import SimmSpline
 from osimlite.schema.geometry import Brick, Cylinder, Ellipsoid, Geometry, Sphere
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
 from tests.translate.mjcf.test_names import HOSTILE, hostile
@@ -126,3 +127,14 @@ def test_a_muscle_that_cannot_shorten_is_left_out_with_a_word(velocity: float) -
     own = [item for item in mjcf.fidelity.records if item.component == f"/forceset/{muscle.name}"]
     (record,) = [item for item in own if item.kind == "force"]
     assert record.done.startswith("left out: ")
+
+
+@pytest.mark.parametrize("factor", [1e308, -1e308, float("inf"), float("nan")])
+@pytest.mark.parametrize("spline", ["series", "quartic"])
+def test_a_function_that_cannot_be_fitted_is_refused_with_its_number(factor: float, spline: Any) -> None:
+    model = hostile(f"n{k}" for k in range(50))
+    coupler = next(iter(model.components(CoordinateCouplerConstraint)))
+    coupler.coupled_coordinates_function = SimmSpline(x=(-1.0, 0.0, 0.5, 1.0), y=(0.0, 0.1, 0.4, 0.5))
+    coupler.scale_factor = factor
+    with pytest.raises(OsimliteError, match=r"^scale_factor of '/constraintset/n18', \S+, is too large or too small"):
+        osimlite.to_mjcf(model, spline=spline)
