@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.files.storage import StoTable
@@ -21,8 +22,6 @@ PRECISION = 8
 _PADDING = 8
 _BLOCK = 4096
 """So many numbers are written at once."""
-_CELL = np.dtype([("whole", "u8"), ("first", "u4"), ("last", "u4"), ("end", "u1")])
-"""A number as text: up to the point, twice four decimals, and what stands behind it."""
 
 
 def printed(table: StoTable, description: str = "", precision: int = PRECISION) -> Iterator[str]:
@@ -44,44 +43,70 @@ def printed(table: StoTable, description: str = "", precision: int = PRECISION) 
     cell = f"%{precision + _PADDING}.{precision}f"
     for start in range(0, len(rows), step):
         block = rows[start : start + step]
-        text = _eight_decimals(block, cell) if precision == PRECISION else None
+        text = _decimals(block, cell, precision // 8) if precision in (8, 16) else None
         if text is None:
             line = "\t".join([cell] * rows.shape[1]) + "\n"
             text = "".join([line % tuple(row) for row in block.tolist()])
         yield text
 
 
-def _eight_decimals(rows: Array, cell: str) -> str | None:
-    """Lines of numbers as the format of a cell writes each, all at once; None if one is wider than the others."""
+def _decimals(rows: Array, cell: str, eights: int) -> str | None:
+    """Lines of numbers with so many times eight decimals as the format of a cell writes them, all at once.
+
+    None if one is wider than the others.
+    """
     # What has more than four digits before the point is rare, and so is what is no number.
     plain = np.abs(rows) < 9999.0
     size = np.where(plain, np.abs(rows), 0.0)
-    whole = size.astype(np.int64)
-    part = size - whole
-    # The product and what its rounding leaves over: T. J. Dekker, Numer. Math. 18, 1971. 1e8 has few enough digits.
-    product, split = 1e8 * part, 134217729.0 * part
-    high = split - (split - part)
-    over = (1e8 * high - product) + 1e8 * (part - high)
-    nearest = np.rint(product)
-    # Halves are none if something is left over.
-    half = product - nearest
-    nearest += np.where((np.abs(half) == 0.5) & (half * over > 0.0), 2.0 * half, 0.0)
-    first, last = np.divmod(nearest.astype(np.int32), 10000)
-    whole += first == 10000
-    first[first == 10000] = 0
+    digits = [size.astype(np.int64), *_eights(size - size.astype(np.int64), eights)]
+    for before, eight in zip(digits[-2::-1], digits[:0:-1], strict=True):
+        before += eight == 10**8
+        eight[eight == 10**8] = 0
     wholes, fours = _texts()
-    cells = np.empty(rows.shape, _CELL)
-    cells["whole"] = wholes[whole + 10000 * np.signbit(rows)]
-    cells["first"], cells["last"] = fours[first], fours[last]
+    names = [f"{half}{number}" for number in range(eights) for half in ("first", "last")]
+    # A number as text: up to the point, four decimals and four more each time, and what stands behind it.
+    cells = np.empty(rows.shape, [("whole", "u8"), *((name, "u4") for name in names), ("end", "u1")])
+    cells["whole"] = wholes[digits[0] + 10000 * np.signbit(rows)]
+    for number, eight in enumerate(digits[1:]):
+        first, last = np.divmod(eight.astype(np.int32), 10000)
+        cells[f"first{number}"], cells[f"last{number}"] = fours[first], fours[last]
     cells["end"], cells["end"][:, -1] = ord("\t"), ord("\n")
-    width = _CELL.itemsize - 1
-    flat = cells.view("u1").reshape(-1, _CELL.itemsize)
+    width = cells.itemsize - 1
+    flat = cells.view("u1").reshape(-1, cells.itemsize)
     for place in np.flatnonzero(~plain):
         text = cell % rows.flat[place]
         if len(text) > width:
             return None
         flat[place, :width] = np.frombuffer(text.encode(), "u1")
     return cells.tobytes().decode()
+
+
+def _eights(part: Array, count: int) -> list[NDArray[np.int64]]:
+    """Whole numbers of eight decimals each, one behind the other, of numbers from 0 up to 1.
+
+    The last is rounded to the nearest, to the even of two, and may be 1e8. A product comes with what its rounding
+    leaves over: T. J. Dekker, Numer. Math. 18, 1971. 1e8 has few enough digits for all to be exact.
+    """
+    high, low, found = part, np.zeros_like(part), []
+    for number in range(count):
+        product, split = 1e8 * high, 134217729.0 * high
+        upper = split - (split - high)
+        over = (1e8 * upper - product) + 1e8 * (high - upper) + 1e8 * low
+        value = product + over
+        over -= value - product
+        if number == count - 1:
+            whole = np.rint(value)
+            # Halves are none if something is left over.
+            half = value - whole
+            whole += np.where((np.abs(half) == 0.5) & (half * over > 0.0), 2.0 * half, 0.0)
+        else:
+            whole = np.floor(value)
+            whole -= (value == whole) & (over < 0.0)
+            rest = value - whole
+            high = rest + over
+            low = over - (high - rest)
+        found.append(whole.astype(np.int64))
+    return found
 
 
 @cache

@@ -15,6 +15,9 @@ TABLES = {
     "plain": PLAIN,
     "of all sizes": PLAIN * 10.0 ** RNG.uniform(-13.0, 4.9, PLAIN.shape),
     "ties in binary": RNG.integers(-(10**6), 10**6, PLAIN.shape) / 512.0,
+    "ties behind": RNG.integers(-(2**40), 2**40, PLAIN.shape) / 2.0**17,
+    "carried far": 1.0 - 2.0 ** RNG.uniform(-55.0, -40.0, PLAIN.shape),
+    "whole eights": np.round(RNG.uniform(0.0, 1.0, PLAIN.shape), 8),
     "nearly ties": np.round(PLAIN, 8) + 5e-9,
     "edges": np.vstack([ODD, -ODD]),
     "no numbers": np.array([[np.nan, np.inf, -np.inf, 1.0, -2.0, 12345.678, -9999.0]]),
@@ -25,7 +28,7 @@ TABLES = {
 }
 
 
-@pytest.mark.parametrize("precision", [8, 5])
+@pytest.mark.parametrize("precision", [16, 8, 5])
 @pytest.mark.parametrize("name", TABLES)
 def test_every_number_is_as_its_format_writes_it(name: str, precision: int) -> None:
     rows = TABLES[name]
