@@ -90,6 +90,24 @@ def test_who_turns_around_goes_on_at_the_other_end(low: float, high: float, way:
     assert others == pytest.approx(np.delete(poses(angles), FACING, axis=1), abs=1e-8)
 
 
+@pytest.mark.parametrize("turning", [0, 1, 2])
+@pytest.mark.parametrize("widest", [90.0, 180.0])
+def test_who_turns_over_is_followed(turning: int, widest: float) -> None:
+    """Head over heels, sideways or on the spot: the ranges of the three angles leave no rotation out."""
+    model = turner(-180.0, 180.0)
+    steps = np.arange(0.0, 720.0, 8.0)
+    values = poses(steps)
+    values[:, :3] = 0.2 * np.sin(0.1 * np.arange(len(steps))[:, None] + np.arange(3.0))
+    values[:, turning] = np.radians(steps)
+    _, _, places = trial_of(model, values)
+    for number, coordinate in enumerate([*model.components(osimlite.Coordinate)][:3]):
+        end = float(np.radians(widest if number == 1 else 180.0))
+        coordinate.clamped, coordinate.range = True, (-end, end)
+    found = fitted(model, places)
+    assert found.costs.max() < 1e-15 and not found.unsettled
+    assert found.values[:, 3:] == pytest.approx(values[:, 3:], abs=1e-7)
+
+
 @pytest.mark.parametrize(("low", "high"), [(-170.0, 170.0), (-90.0, 90.0), (-180.0, 180.0)])
 def test_every_frame_is_at_the_least_of_all_minima(low: float, high: float) -> None:
     """Against a search from all around, also where the range leaves out a part of the turn."""

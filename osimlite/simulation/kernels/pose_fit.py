@@ -10,25 +10,16 @@ from __future__ import annotations
 
 from math import floor, inf, pi
 
-from osimlite.forces.vectors import dot, put, vector
+from osimlite.forces.vectors import put
 from osimlite.simulation.kernels.layout import (
-    END_FREEDOM,
-    FIRST_FREEDOM,
     FREEDOMS,
-    GRAVITY_AT,
-    LINK_AT,
-    LINK_INTS,
-    LINKS,
     OK,
-    PARENT,
-    WORK_COLUMN,
 )
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import station
 from osimlite.simulation.kernels.pose_bonds import bend_equations, forget_bends, settle
 from osimlite.simulation.kernels.pose_cost import cost, equations_of, look
 from osimlite.simulation.kernels.pose_record import (
-    AT_END,
     GOALS,
     HELD,
     HISTORY,
@@ -38,7 +29,6 @@ from osimlite.simulation.kernels.pose_record import (
     MARKERS,
     MEASURED,
     PATTERN,
-    RANGES_AT,
     RESOLVED_AT,
     SENSOR_NUMBERS,
     SENSORS,
@@ -51,6 +41,16 @@ from osimlite.simulation.kernels.pose_record import (
     Fit,
 )
 from osimlite.simulation.kernels.pose_sensors import turn_of
+from osimlite.simulation.kernels.pose_starts import (
+    INWARDS,
+    ROUND,
+    go_round,
+    leave_ends,
+    move_inwards,
+    turn_over,
+    turn_round,
+    unwind,
+)
 from osimlite.simulation.kernels.pose_step import find_ends, find_step, free_ends, list_free, solve_free
 from osimlite.simulation.kernels.states import copy, is_finite
 
@@ -71,11 +71,6 @@ PATIENCE = 8
 """After how many steps the whole second derivative is taken, also where poses look alike or steps are short."""
 POSES = 2
 """How many poses are kept to go on from."""
-INWARDS = 0.3
-"""How far from the ends of their ranges coordinates begin when a better pose is looked for (rad or m)."""
-ROUND = 0.75 * pi
-"""By how much the first pose is turned in ground, to either side, when a better one is looked for (rad): a range may
-reach to just before half a turn."""
 RENEWED = 5
 """After how many steps the second derivatives of the equations are found anew, which not every pose needs."""
 
@@ -171,10 +166,16 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     if leave_ends(m, y, start):
         value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
         steps += more
+    value, more, status = come_round(m, start, y, value, status, lightest)
+    steps += more
     for number in range(size):
-        if go_round(m, y, start, number):
-            value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
+        if turn_over(m, y, start, number):
+            upright = value
+            value, more, status = descend_again(m, start, y, value, status, SMALL_STEPS, lightest)
             steps += more
+            if value < upright:
+                value, more, status = come_round(m, start, y, value, status, lightest)
+                steps += more
     if kept == 0 and unwind(m, y, last, start, value):
         value, more, status = descend(m, start, y, cost(m, start), lightest, lightest)
         steps += more
@@ -230,85 +231,16 @@ def descend_again(
     return value, steps, status
 
 
-def move_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> None:
-    """A pose in which no clamped coordinate is near an end of its range."""
-    ranges = at(m.c, m.p[RANGES_AT])
-    for k in range(m.s[FREEDOMS]):
-        low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], from_pose[k]
-        if low < high:
-            inner = min(inwards, 0.5 * (high - low))
-            start[k] = min(max(start[k], low + inner), high - inner)
-
-
-def turn_round(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: float) -> bool:
-    """A pose in which what a joint to ground carries is turned about the vertical; false if this is no such coordinate.
-
-    Subjects walk to and fro, and the way down from half a turn away may lead elsewhere.
-    """
-    s, p, ranges = m.s, m.p, at(m.c, m.p[RANGES_AT])
-    move_inwards(m, from_pose, start, 2.0 * INWARDS)
-    start[freedom] += angle
-    is_inside = ranges[2 * freedom] <= start[freedom] <= ranges[2 * freedom + 1]
-    if not (is_of_ground(m, freedom) and is_inside and p[p[RESOLVED_AT] + freedom] in (VARIABLE, AT_END)):
-        return False
-    look(m, from_pose)
-    down, turn = vector(m.x, GRAVITY_AT), vector(at(m.w, s[WORK_COLUMN]), 6 * freedom)
-    return dot(turn, turn) > 0.0 and 2.0 * dot(turn, down) ** 2 >= dot(turn, turn) * dot(down, down)
-
-
-def is_of_ground(m: Fit, freedom: int) -> bool:
-    """Whether a joint to ground has this degree of freedom."""
-    s, found = m.s, False
-    for link in range(s[LINKS]):
-        j = at(s, s[LINK_AT] + LINK_INTS * link)
-        found = found or (j[PARENT] < 0 and j[FIRST_FREEDOM] <= freedom < j[END_FREEDOM])
-    return found
-
-
-def go_round(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
-    """A pose in which an angle at one end of its range is a whole turn on, or at the other end; false if it is at none.
-
-    Who turns on the spot comes round. Other joints than those to ground do only if their ranges leave out little.
-    """
-    p, ranges = m.p, at(m.c, m.p[RANGES_AT])
-    low, high = ranges[2 * freedom], ranges[2 * freedom + 1]
-    is_low, is_high = y[freedom] <= low + FINEST, y[freedom] >= high - FINEST
-    if is_low == is_high or not high - low < inf or p[p[RESOLVED_AT] + freedom] not in (VARIABLE, AT_END):
-        return False
-    if not (high - low > pi + FINEST or is_of_ground(m, freedom)):
-        return False
-    copy(m.s[FREEDOMS], y, start)
-    start[freedom] = min(high, low + 2.0 * pi) if is_low else max(low, high - 2.0 * pi)
-    look(m, y)
-    turn = vector(at(m.w, m.s[WORK_COLUMN]), 6 * freedom)
-    return dot(turn, turn) > 0.0
-
-
-def leave_ends(m: Fit, y: Floats, start: Floats) -> bool:
-    """A pose in which what is at an end of its range is not; false if there is nothing."""
-    ranges, found = at(m.c, m.p[RANGES_AT]), False
-    for k in range(m.s[FREEDOMS]):
-        low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], y[k]
-        if m.p[m.p[RESOLVED_AT] + k] == AT_END and low < high:
-            inwards = min(INWARDS, 0.5 * (high - low))
-            start[k], found = low + inwards if y[k] <= low else high - inwards, True
-    return found
-
-
-def unwind(m: Fit, y: Floats, first: Floats, start: Floats, value: float) -> bool:
-    """A pose without the whole turns that the way from the first one has led to, if it costs no more."""
-    size, ranges, trial, found = m.s[FREEDOMS], at(m.c, m.p[RANGES_AT]), at(m.v, m.p[TRIAL]), False
-    copy(size, y, start)
-    for k in range(size):
-        turns = floor((y[k] - first[k]) / (2.0 * pi) + 0.5)
-        near = y[k] - 2.0 * pi * turns
-        if turns != 0.0 and ranges[2 * k] <= near <= ranges[2 * k + 1]:
-            copy(size, start, trial)
-            trial[k] = near
-            if settle(m, trial) and cost(m, trial) <= value * (1.0 + 1e-9) + 1e-20:
-                copy(size, trial, start)
-                found = True
-    return found
+def come_round(
+    m: Fit, start: Floats, y: Floats, value: float, status: float, lightest: float
+) -> tuple[float, int, float]:
+    """Look for a better pose with each angle that is at an end of its range at the other one; keep the best."""
+    steps = 0
+    for number in range(m.s[FREEDOMS]):
+        if go_round(m, y, start, number):
+            value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
+            steps += more
+    return value, steps, status
 
 
 def weigh(m: Fit) -> bool:
