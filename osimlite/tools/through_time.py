@@ -15,7 +15,7 @@ from osimlite.multibody.spatial import Array
 from osimlite.records import replace
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Object
-from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.controller_types import CorrectionController, PrescribedController
 from osimlite.schema.forces import ForceSet
 from osimlite.schema.model import Model
 from osimlite.schema.specs import file_specs
@@ -79,7 +79,11 @@ def analyse(job: Job, outcome: Outcome, analyses: Analyses, motion: Motion, firs
 
 
 def told_model(job: Job) -> Model:
-    """The model of a setup with the forces and controllers that the setup gives it."""
+    """The model of a setup with the forces and controllers that the setup gives it.
+
+    Raises:
+        NotRunnable: one of the controllers adds actuators that follow the states of the setup.
+    """
     setup: AbstractTool = job.setup
     model = job.model()
     if setup.replace_force_set:
@@ -97,6 +101,10 @@ def told_model(job: Job) -> Model:
         if functions and not own.socket_actuators and len(functions) == len(actuators):
             own.socket_actuators = tuple(actuators)
         model.controller_set.objects.append(own)
+    for controller in model.components(CorrectionController):
+        if controller.enabled:
+            told = f"'{controller.name}', a CorrectionController, cannot be computed yet; say <enabled>false</enabled>"
+            raise NotRunnable(told, file=str(job.file))
     return model
 
 

@@ -91,6 +91,11 @@ def test_steps_keep_their_bounds(setup: Path) -> None:
         ("states.sto", "degrees.sto", "in degrees, which OpenSim refuses"),
         ("states.sto", "others.sto", "no column with a state of the model"),
         ("</objects></AnalysisSet>", "<StaticOptimization name='so'/></objects></AnalysisSet>", "cannot be computed"),
+        (
+            "<states_file>",
+            "<ControllerSet><objects><CorrectionController name='cc'/></objects></ControllerSet><states_file>",
+            "'cc', a CorrectionController, .*<enabled>false",
+        ),
     ],
 )
 def test_what_means_nothing_is_refused_and_nothing_is_written(setup: Path, old: str, new: str, said: str) -> None:
