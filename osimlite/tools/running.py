@@ -75,9 +75,12 @@ def run(
         raise NotRunnable(f"setups of {tag} cannot be run; those of {listed(runnable())} can", file=str(file))
     outcome = Outcome()
     if check:
-        report = merged(_reports(str(file)))
+        away: dict[str, None] = {}
+        report = merged(_reports(str(file), away))
         if report.errors:
             raise FaultySetup(report)
+        if away:
+            outcome.tell("taken from here", f"{listed(away)}, not beside the setup")
         outcome.warnings = sorted(report.warnings, key=lambda found: found.suggestion is None)
         misspelt = [found for found in outcome.warnings if found.suggestion is not None]
         if tell is not None and misspelt:
@@ -103,16 +106,22 @@ def _is_there(tag: str) -> bool:
     return of_tools and find_spec(f"{__package__}.{module_name(tag)}") is not None
 
 
-def _reports(file: str, passed: frozenset[str] = frozenset()) -> Iterator[Report]:
-    """What is wrong with a document and with the documents and tables that it names; models are left out."""
+def _reports(file: str, away: dict[str, None], passed: frozenset[str] = frozenset()) -> Iterator[Report]:
+    """What is wrong with a document and with the documents and tables that it names; models are left out.
+
+    Files that are in the current folder, and not in that of the document that names them, are noted in `away`.
+    """
     subject = subject_of(file, settings_of(file).config_for(file, Config()))
     yield checked(subject, measure=False)
     if isinstance(subject, Setup):
         for naming in subject.named_files("file"):
-            path = Path(naming.path)
-            if naming.path in passed or not os.path.isfile(path) or not _is_checked(naming.path):
+            path = naming.path
+            if not os.path.isfile(path):
                 continue
-            yield from _reports(naming.path, passed | {file})
+            if path == naming.name.strip() and not os.path.isabs(path):
+                away[path] = None
+            if path not in passed and _is_checked(path):
+                yield from _reports(path, away, passed | {file})
 
 
 def _is_checked(path: str) -> bool:

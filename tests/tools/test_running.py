@@ -56,6 +56,18 @@ def test_what_is_written_and_what_is_returned(setup: Path) -> None:
     assert lines[7].startswith("      0.02000000\t")
 
 
+def test_a_file_of_the_current_folder_is_told(setup: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A trial without data must not take those of another one without a word."""
+    trial = setup.parent / "trial"
+    trial.mkdir()
+    for name in ("setup.xml", "walker.osim"):
+        (trial / name).write_bytes((setup.parent / name).read_bytes())
+    monkeypatch.chdir(setup.parent)
+    assert ("taken from here", "walk.mot, not beside the setup") in osimlite.run("trial/setup.xml").told
+    done = run("run", "trial/setup.xml", "setup.xml", "-o", "out", folder=setup.parent)
+    assert done.out.count("taken from here walk.mot, not beside") == 1
+
+
 def test_the_command_runs_from_anywhere_and_writes_where_it_is_told(setup: Path, tmp_path: Path) -> None:
     away = tmp_path / "away"
     away.mkdir()
