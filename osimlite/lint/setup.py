@@ -254,8 +254,8 @@ class Setup(Subject):
         files = filter(None, map(self._place_by_tool, names))
         return [(file, added) for file in files if (added := top_at(file)) is not None]
 
-    def is_written(self, path: str) -> bool:
-        """Whether another setup of the project writes a file: it need not be there yet."""
+    def writer_of(self, path: str) -> str | None:
+        """The other setup of the project that writes a file, which need not be there yet; None if none does."""
         wanted = os.path.realpath(path)
         around = self._tools_in(list(Path(wanted).parents)[:3])
         for file, top in dict(self.neighbours + around).items():
@@ -266,12 +266,12 @@ class Setup(Subject):
             within = os.path.realpath(os.path.join(folder, results))
             # Tools that run through time call their results by their own name.
             if os.path.dirname(wanted) == within and os.path.basename(wanted).startswith(f"{top.name}_"):
-                return True
+                return file
             for item in top.walk():
                 for _, name in files_of(item, "output-file"):
                     if wanted in (os.path.realpath(os.path.join(place, name)) for place in (folder, within)):
-                        return True
-        return False
+                        return file
+        return None
 
 
 def is_given(name: str) -> bool:

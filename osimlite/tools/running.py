@@ -10,7 +10,8 @@ from pathlib import Path
 
 from osimlite._load import module_name
 from osimlite.document.reader import collector_paused, read_any
-from osimlite.errors import DocumentError, OsimliteError
+from osimlite.errors import DocumentError, MissingFileError, OsimliteError
+from osimlite.files import from_folder
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report, merged
 from osimlite.lint.engine import run as checked
@@ -91,6 +92,9 @@ def run(
         outcome.write(file)
     except OsimliteError as error:
         error.file = error.file or str(file)
+        subject = subject_of(str(file), Config()) if isinstance(error, MissingFileError) else None
+        if isinstance(subject, Setup) and (maker := subject.writer_of(error.file)) is not None:
+            error.message += f"; run '{from_folder(maker, Path.cwd())}' first, which should make it"
         raise
     return outcome
 

@@ -68,6 +68,15 @@ def test_a_file_of_the_current_folder_is_told(setup: Path, monkeypatch: pytest.M
     assert done.out.count("taken from here walk.mot, not beside") == 1
 
 
+def test_the_setup_that_makes_what_is_missing_is_told(setup: Path) -> None:
+    """Whoever runs inverse dynamics first forgot inverse kinematics."""
+    (setup.parent / "walk.mot").unlink()
+    fit = osimlite.InverseKinematicsTool(name="ik", model_file="walker.osim", output_motion_file="walk.mot")
+    osimlite.write(fit, setup.with_name("fit.xml"))
+    done = run("run", "setup.xml", folder=setup.parent)
+    assert done.code == 2 and "walk.mot: cannot read the file: no such file; run 'fit.xml' first, which" in done.err
+
+
 def test_the_command_runs_from_anywhere_and_writes_where_it_is_told(setup: Path, tmp_path: Path) -> None:
     away = tmp_path / "away"
     away.mkdir()

@@ -44,7 +44,7 @@ def missing_input(setup: Setup, found: FindingSink) -> None:
     ```
     """
     for naming in setup.named_files("file"):
-        if os.path.isfile(naming.path) or setup.is_written(naming.path):
+        if os.path.isfile(naming.path) or setup.writer_of(naming.path):
             continue
         slashed = naming.name.replace("\\", "/")
         is_meant = slashed != naming.name and os.path.isfile(setup.place(slashed))
