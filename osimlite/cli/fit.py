@@ -44,7 +44,7 @@ def fit(
 
     person = fitted(
         read(file),
-        {path.name: path for path in trials},
+        {str(path): path for path in trials},
         static,
         weights=options.named_numbers(weight, "--weight"),
         held=held,

@@ -101,6 +101,14 @@ def test_a_model_is_fitted_to_a_person(lab: Path) -> None:
     assert run("run", "setup_scale.xml", folder=lab / "out").code == 0
 
 
+def test_trials_of_two_folders_may_have_one_name(lab: Path) -> None:
+    """Each is fitted, and told."""
+    (lab / "second").mkdir()
+    (lab / "second" / "walk.trc").write_bytes((lab / "walk.trc").read_bytes())
+    done = run("fit", "box.osim", "walk.trc", "second/walk.trc", "-o", "out", folder=lab)
+    assert done.code == 0 and "\nwalk.trc: errors" in done.out and "walk.trc: errors" in done.out.partition("second")[2]
+
+
 def test_a_marker_that_is_not_there_cannot_be_held(lab: Path) -> None:
     """The nearest spelling is told, and nothing is written."""
     done = run("fit", "box.osim", "walk.trc", "--hold", "on", "-o", "out", folder=lab)
