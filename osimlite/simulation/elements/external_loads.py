@@ -7,6 +7,7 @@ a constant if there is one. Before the first time and after the last, a spline g
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,8 +86,8 @@ def read_external_loads(mechanism: Mechanism, source: str | Path | ExternalLoads
         raise DocumentError(f"{told}, or say so to inverse-dynamics by --applied-to", file=str(source))
     else:
         loads, folder, file = read_object(source, ExternalLoads), Path(source).parent, str(source)
-    columns = _Columns(loads_table(loads, folder, file))
-    forces = (force for force in loads.objects if force.appliesForce)
+    forces = [force for force in loads.objects if force.appliesForce]
+    columns = _Columns(loads_table(loads, folder, file), forces)
     return tuple(
         external_load(f"/componentset/{loads.name}/{force.name}", force.name, _load(mechanism, force, columns, file))
         for force in forces
@@ -102,7 +103,7 @@ def load_in_model(builder: ElementBuilder, force: ExternalForce) -> Load:
     loads: Any = builder.tree.parent_of(force)
     if not isinstance(loads, ExternalLoads):
         raise builder.unsupported(force, " outside of ExternalLoads, so that it has no data file")
-    columns = _Columns(loads_table(loads, builder.folder, builder.path(loads)))
+    columns = _Columns(loads_table(loads, builder.folder, builder.path(loads)), [force])
     return _load(builder.mechanism, force, columns, builder.path(loads))
 
 
@@ -120,11 +121,9 @@ def loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> StoTabl
 
 
 def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: str | None) -> Load:
-    identifiers = {what: (getattr(force, f"{what}_identifier") or "").strip() for what in PARTS}
     given = {
         what: columns.three(identifier, f"the {what}_identifier of '{force.name}'", file)
-        for what, identifier in identifiers.items()
-        if identifier not in ("", "Unassigned")
+        for what, identifier in _identifiers(force).items()
     }
     if not given.keys() & {"force", "torque"}:
         raise DocumentError(f"'{force.name}' has no force_identifier and no torque_identifier; give it one", file=file)
@@ -146,6 +145,12 @@ def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: s
     )
 
 
+def _identifiers(force: ExternalForce) -> dict[str, str]:
+    """What the labels of the columns of a force begin with, by their parts; those that are given."""
+    given = {what: (getattr(force, f"{what}_identifier") or "").strip() for what in PARTS}
+    return {what: identifier for what, identifier in given.items() if identifier not in ("", "Unassigned")}
+
+
 def _place(mechanism: Mechanism, value: Any, what: str, file: str | None) -> FramePlacement:
     """The frame of a path or the name of a body."""
     name = value if isinstance(value, str) else value.name
@@ -156,36 +161,43 @@ def _place(mechanism: Mechanism, value: Any, what: str, file: str | None) -> Fra
 
 
 class _Columns:
-    """The columns of a table as functions of time, each made once."""
+    """The columns of a table that some forces name, as functions of time."""
 
-    def __init__(self, table: StoTable) -> None:
-        self.table = table
+    def __init__(self, table: StoTable, forces: Sequence[ExternalForce]) -> None:
+        self.table, self._forces = table, forces
         late = np.flatnonzero(np.diff(table.times) <= 0.0)
         if len(late):
             before, after = table.times[late[0] : late[0] + 2]
             raise DocumentError(f"the time {after:g} does not come after {before:g}; sort the rows", file=table.file)
         if not len(table.times):
             raise DocumentError("the table has no rows", file=table.file)
-        self._made: dict[str, Functions] = {}
+
+    @cached_property
+    def _functions(self) -> dict[int, Function]:
+        """Those of all columns that are named, by their places: one solution of the equations of their splines."""
+        starts = tuple({identifier for force in self._forces for identifier in _identifiers(force).values()})
+        named = [place for place, label in enumerate(self.table.columns) if label.startswith(starts)]
+        rows = self.table.rows[:, named]
+        # Gaps are told of where they are asked for.
+        sound = np.where(np.isfinite(rows), rows, 0.0)
+        return dict(zip(named, functions_of(self.table.times, sound), strict=True))
 
     def three(self, identifier: str, what: str, file: str | None) -> Functions:
         """The functions of the three columns whose labels begin with an identifier."""
-        if identifier not in self._made:
-            labels = self.table.columns
-            places = [place for place, label in enumerate(labels) if label.startswith(identifier)]
-            if len(places) != 3:
-                raise DocumentError(f"{what} is '{identifier}'; {self._why(identifier, places)}", file=file)
-            rows = self.table.rows[:, places]
-            bad = np.argwhere(~np.isfinite(rows))
-            if len(bad):
-                row, column = bad[0]
-                raise DocumentError(
-                    f"'{labels[places[column]]}' is {rows[row, column]} at {self.table.times[row]:g} s; fill the gap",
-                    file=self.table.file,
-                )
-            x, y, z = functions_of(self.table.times, rows)
-            self._made[identifier] = x, y, z
-        return self._made[identifier]
+        labels = self.table.columns
+        places = [place for place, label in enumerate(labels) if label.startswith(identifier)]
+        if len(places) != 3:
+            raise DocumentError(f"{what} is '{identifier}'; {self._why(identifier, places)}", file=file)
+        rows = self.table.rows[:, places]
+        bad = np.argwhere(~np.isfinite(rows))
+        if len(bad):
+            row, column = bad[0]
+            raise DocumentError(
+                f"'{labels[places[column]]}' is {rows[row, column]} at {self.table.times[row]:g} s; fill the gap",
+                file=self.table.file,
+            )
+        x, y, z = (self._functions[place] for place in places)
+        return x, y, z
 
     def _why(self, identifier: str, places: Sequence[int]) -> str:
         file, labels = self.table.file, self.table.columns
