@@ -121,7 +121,7 @@ def custom(
 def _along(kind: Literal["rotate", "translate"], axis: TransformAxis) -> AxisMotion:
     direction = np.array(axis.axis, dtype=float)
     length = float(np.linalg.norm(direction))
-    if not length > 0.0:
+    if not 0.0 < length < np.inf:
         raise ModelError(f"the axis {direction.tolist()} of a transform has no direction; give one that is not zero")
     return AxisMotion(kind, direction / length, axis.coordinates, axis.function)
 

@@ -114,7 +114,7 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
     tied = draft.tied(path)
     cos = math.cos(force.pennation_angle_at_optimal)
     own = Curves(force.tendon_slack_length, force.optimal_fiber_length * cos, force.max_isometric_force * cos)
-    if not (own.fiber > 0.0 and own.force > 0.0 and own.tendon >= 0.0):
+    if not (own.tendon + own.fiber > own.tendon and own.force > 0.0 and own.tendon >= 0.0):
         raise Unsayable("its lengths or its force are not positive")
     vmax, fvmax = _asked(force, "vmax", 0.0) / cos**2, _asked(force, "fvmax", FVMAX)
     if not min(vmax, fvmax) > LEAST_RATE:

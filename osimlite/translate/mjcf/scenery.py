@@ -39,6 +39,7 @@ def add_camera(draft: Draft) -> None:
     spots = np.array([np.zeros(3), *(state.transform(index)[:3, 3] for index in range(len(draft.mechanism.bodies)))])
     low, high = spots.min(axis=0), spots.max(axis=0)
     fall = draft.mechanism.gravity if draft.mechanism.gravity.any() else np.array((0.0, -1.0, 0.0))
+    fall = fall / np.abs(fall).max()
     up = -fall / np.linalg.norm(fall)
     right = np.eye(3)[0] if abs(up[0]) < 0.9 else np.eye(3)[1]
     right = right - (right @ up) * up

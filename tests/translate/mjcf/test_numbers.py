@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 import osimlite
-from osimlite import Body, Coordinate, CoordinateCouplerConstraint, Model, PinJoint
-from osimlite.errors import OsimliteError
+from osimlite import Body, Coordinate, CoordinateCouplerConstraint, CustomJoint, Model, PinJoint
+from osimlite.errors import ModelError, OsimliteError
 from osimlite.schema.base import Object
 from osimlite.schema.functions import SimmSpline
 from osimlite.schema.geometry import Brick, Cylinder, Ellipsoid, Geometry, Sphere
@@ -117,11 +117,30 @@ def test_a_shape_without_a_size_is_left_out_with_a_word() -> None:
         assert record.detail == "0.2 0 0.2 m"
 
 
-@pytest.mark.parametrize("velocity", [1e-320, 0.0, -1.0])
-def test_a_muscle_that_cannot_shorten_is_left_out_with_a_word(velocity: float) -> None:
+@pytest.mark.parametrize("gravity", [1e308, 1e-320, -1e200])
+def test_a_camera_stands_upright_in_any_gravity(gravity: float) -> None:
+    model = with_shape(Sphere(radius=0.1))
+    model.gravity = (gravity, gravity, 0.0)
+    assert taken(model)
+
+
+@pytest.mark.parametrize("size", [1e308, 1e200])
+def test_an_axis_whose_length_is_no_number_is_refused(size: float) -> None:
+    model = hostile(f"n{k}" for k in range(50))
+    joint = next(iter(model.components(CustomJoint)))
+    joint.spatial_transform.rotation1.axis = (0.0, 0.0, size)
+    with pytest.raises(ModelError, match="has no direction"):
+        osimlite.to_mjcf(model)
+
+
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [*(("max_contraction_velocity", number) for number in (1e-320, 0.0, -1.0)), ("optimal_fiber_length", 1e-30)],
+)
+def test_a_muscle_that_cannot_shorten_is_left_out_with_a_word(name: str, number: float) -> None:
     model = hostile(f"n{k}" for k in range(50))
     muscle = next(iter(model.components(Millard2012EquilibriumMuscle)))
-    muscle.max_contraction_velocity = velocity
+    setattr(muscle, name, number)
     mjcf = osimlite.to_mjcf(model)
     mujoco.MjModel.from_xml_string(mjcf.text, mjcf.files)
     own = [item for item in mjcf.fidelity.records if item.component == f"/forceset/{muscle.name}"]
