@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 WORTH_SHARING = 4
 """Of fewer setups, processes of their own take longer to begin than they save."""
+MOST_WARNINGS = 3
+"""Of a setup that is run alone, so many are shown beside what is misspelt."""
 MOST_ROWS = 40
 """Of more setups those are shown that failed, or whose markers are farthest off."""
 
@@ -136,9 +138,12 @@ def _show(setup: Path, outcome: Outcome) -> None:
     from osimlite.text import counted
 
     facts = Facts(str(setup), outcome.told)
-    if outcome.warnings:
-        files = " ".join(dict.fromkeys(finding.file or str(setup) for finding in outcome.warnings))
-        facts.add("check", f"{counted(len(outcome.warnings), 'warning')}; see them with: osimlite validate {files}")
+    unsaid = [finding for finding in outcome.warnings if finding.suggestion is None]
+    for finding in unsaid[:MOST_WARNINGS]:
+        facts.add("check", str(finding))
+    if (more := len(unsaid) - MOST_WARNINGS) > 0:
+        files = " ".join(dict.fromkeys(finding.file or str(setup) for finding in unsaid))
+        facts.add("check", f"{counted(more, 'warning')} more; see them with: osimlite validate {files}")
     facts.add("files", ", ".join(str(path) for path in outcome.files) or "none")
     facts.show()
 

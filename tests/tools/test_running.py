@@ -83,6 +83,7 @@ def test_the_command_runs_from_anywhere_and_writes_where_it_is_told(setup: Path,
     for word in ("run", "run-tool"):
         done = run(word, "../setup.xml", "-o", word, folder=away)
         assert (done.code, done.err) == (0, "") and f"{word}/forces.sto" in done.out
+        assert "check ../setup.xml:7:27: warning OSIM842 'walk.mot' has no column" in " ".join(done.out.split())
         assert [path.name for path in (away / word).iterdir()] == ["forces.sto"]
     assert not (tmp_path / "results").exists()
 
