@@ -141,7 +141,8 @@ def test_a_folder_for_all_has_one_for_each(trials: Path) -> None:
     ]
 
 
-def test_two_that_write_one_file_are_told(trials: Path) -> None:
+def test_two_that_write_one_file_are_told(trials: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(trials)
     setup = trials / "trial0" / "z_ik.xml"
     (trials / "trial0" / "again.xml").write_bytes(setup.read_bytes())
     one, two = run_many([setup, setup.with_name("again.xml")])
