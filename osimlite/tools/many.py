@@ -103,7 +103,8 @@ def run_many(
 
     Args:
         setups: the files.
-        output: a folder for all results, with one in it for each setup, named after the setup's place among them.
+        output: a folder for all results, with one in it for each setup, named after the setup's place among them; one
+            that needs what another makes is not run then.
         workers: processes of this machine; by default all is done in this one; None for one for each core.
         cluster: address of a Dask scheduler whose workers do it instead; they see the same files.
         resume: leave out what an earlier run has done, if its inputs and its results are still there unchanged.
@@ -119,7 +120,7 @@ def run_many(
     """
     journal = _Journal(output or Path(), resume, is_kept=len(setups) > 1)
     places = places_of(setups, output)
-    work = _Work(setups, journal, progress)
+    work = _Work(setups, journal, progress, apart=output is not None)
     do = partial(_one, places, kept)
     try:
         if cluster is None and workers == 1:
@@ -249,9 +250,14 @@ class _Work:
     """Which setups can be run, and what became of others."""
 
     def __init__(
-        self, setups: Sequence[Path], journal: _Journal, progress: Callable[[int, int], object] | None
+        self,
+        setups: Sequence[Path],
+        journal: _Journal,
+        progress: Callable[[int, int], object] | None,
+        *,
+        apart: bool,
     ) -> None:
-        self.setups, self.journal, self.progress = setups, journal, progress
+        self.setups, self.journal, self.progress, self._are_apart = setups, journal, progress, apart
         self.trials: dict[Path, Trial] = {}
         self._needs = _needs(setups)
         self._given: set[Path] = set()
@@ -266,8 +272,13 @@ class _Work:
                     continue
                 moved = True
                 self._given.add(setup)
-                broken = [str(one) for one in self._needs[setup] if self.trials[one].status in (FAILED, WAITED)]
-                if broken:
+                needed = [str(one) for one in self._needs[setup]]
+                broken = [one for one in needed if self.trials[Path(one)].status in (FAILED, WAITED)]
+                if needed and self._are_apart:
+                    # What is where it looks for it is missing, or left from another run.
+                    message = f"it needs what {listed(needed)} makes, and -o puts that elsewhere; leave out -o"
+                    self.note(Trial(str(setup), WAITED, message=message))
+                elif broken:
                     message = f"it needs what {listed(broken)} should have made"
                     self.note(Trial(str(setup), WAITED, message=message))
                 elif (trial := self.journal.done(setup)) is not None:
