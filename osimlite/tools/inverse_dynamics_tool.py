@@ -6,7 +6,7 @@ import numpy as np
 
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.schema.joints import Joint, ScapulothoracicJoint
+from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
 from osimlite.schema.tools.dynamics import InverseDynamicsTool
 from osimlite.simulation.elements import force_elements
@@ -17,7 +17,6 @@ from osimlite.text import did_you_mean
 from osimlite.tools.evidence import Evidence, root_of
 from osimlite.tools.job import Job
 from osimlite.tools.joint_loads import loads_at_joints
-from osimlite.tools.not_runnable import NotRunnable
 from osimlite.tools.outcome import Outcome
 
 
@@ -69,11 +68,7 @@ def _tell_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -> 
 
 
 def _joints(job: Job, model: Model, outcome: Outcome) -> list[Joint]:
-    """The joints whose loads are asked for; OpenSim warns of those that are not there.
-
-    Raises:
-        NotRunnable: one is a ScapulothoracicJoint, which OpenSim makes of two.
-    """
+    """The joints whose loads are asked for; OpenSim warns of those that are not there."""
     known = {joint.name: joint for joint in model.joint_set.objects}
     found: list[Joint] = []
     for name in map(str, job.setup.joints_to_report_body_forces):
@@ -85,8 +80,4 @@ def _joints(job: Job, model: Model, outcome: Outcome) -> list[Joint]:
         else:
             told = f"there is no joint '{name}'{did_you_mean(name, known)}: its loads are left out, as in OpenSim"
             outcome.tell("joints_to_report_body_forces", told)
-    for joint in found:
-        if isinstance(joint, ScapulothoracicJoint):
-            told = f"'{joint.name}' is a ScapulothoracicJoint, whose loads cannot be reported yet; leave it out"
-            raise NotRunnable(told, file=str(job.file))
     return found

@@ -10,7 +10,7 @@ from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.schema_frames import Placements
 from osimlite.multibody.spatial import Array
-from osimlite.schema.joints import Joint
+from osimlite.schema.joints import Joint, ScapulothoracicJoint
 from osimlite.schema.model import Model
 from osimlite.simulation.files.recorded import RecordedMotion
 from osimlite.simulation.files.storage import StoTable
@@ -39,28 +39,39 @@ def loads_at_joints(model: Model, joints: Sequence[Joint], recorded: RecordedMot
         frame = placements.named(joint, "socket_child_frame")
         base, _ = placements.frame(frame)
         # OpenSim asks what carries the child, and besides what has the joint's coordinates: others if it closes a loop.
-        asked.append({carried[base], by_joint[placements.path(joint)]})
+        asked.append((joint, {carried[base], by_joint[placements.path(joint)]}))
         root = f"{joint.name}_{placements.path(frame).rpartition('/')[2]}"
         labels += [f"{root}_{what}{axis}" for what in "FM" for axis in "XYZ"]
     rows = np.zeros((len(recorded.times), len(joints), 2, 3))
     for row, q, own in zip(rows, recorded.values, forces, strict=True):
         state = mechanism.at(q)
-        for number, bodies in enumerate(asked):
+        for number, (joint, bodies) in enumerate(asked):
             for body in bodies:
-                row[number] += _load(mechanism, state, body, own)
+                # OpenSim moves a scapula by two mobilizers: along the ellipsoid, and about the axis of winging.
+                row[number] += _load(mechanism, state, body, own, isinstance(joint, ScapulothoracicJoint))
     title = "Inverse Dynamics Body Forces at Specified Joints"
     return StoTable(title, recorded.times, tuple(labels), rows.reshape(len(rows), -1))
 
 
-def _load(mechanism: Mechanism, state: Kinematics, body: int, forces: Array) -> Array:
-    """Force and torque (2, 3) in ground for the generalized forces (n,) of the mobilizer that carries a body."""
+def _load(mechanism: Mechanism, state: Kinematics, body: int, forces: Array, apart: bool) -> Array:
+    """Force and torque (2, 3) in ground for the generalized forces (n,) of the mobilizer that carries a body.
+
+    If `apart`, the sum of those that each of its motions has for itself.
+    """
     mobilizer, own = mechanism.bodies[body].mobilizer, list(mechanism.bodies[body].mobilizer.coordinates)
-    if not own:
-        return np.zeros((2, 3))
-    across = mobilizer.across_motion(state.q[own], state.u[own])
+    q, u, load = state.q[own], state.u[own], np.zeros((2, 3))
     inner = mobilizer.child_frame if mobilizer.reversed else mobilizer.parent_frame
-    hinge = (across.inverse() if mobilizer.reversed else across).jacobian.T
-    turning, moving, wanted = hinge[:, :3], hinge[:, 3:], forces[own]
+    rotation = state.rotations[mechanism.bodies[body].parent] @ inner[:3, :3]
+    across = [part.relative(q, u) for part in mobilizer.motions] if apart else [mobilizer.across_motion(q, u)]
+    for motion in [one.inverse() for one in reversed(across)] if mobilizer.reversed else across:
+        load += _of_hinge(motion.jacobian.T, forces[own]) @ rotation.T
+        rotation = rotation @ motion.rotation
+    return load
+
+
+def _of_hinge(hinge: Array, wanted: Array) -> Array:
+    """Force and torque (2, 3) for the generalized forces (k,) of a hinge whose motion has the Jacobian (k, 6)."""
+    turning, moving = hinge[:, :3], hinge[:, 3:]
     force, torque = _shortest(moving, wanted), _shortest(turning, wanted)
     by_force, by_torque = moving @ force, turning @ torque
     size_by_force, size_by_torque = np.linalg.norm(by_force), np.linalg.norm(by_torque)
@@ -69,8 +80,7 @@ def _load(mechanism: Mechanism, state: Kinematics, body: int, forces: Array) -> 
             force = _shortest(moving, wanted - by_torque)
         else:
             torque = _shortest(turning, wanted - by_force)
-    rotation = state.rotations[mechanism.bodies[body].parent] @ inner[:3, :3]
-    return np.array((rotation @ force, rotation @ torque))
+    return np.array((force, torque))
 
 
 def _shortest(rows: Array, values: Array) -> Array:
