@@ -144,8 +144,15 @@ class StateLayout:
         """States (k, y) with the auxiliary ones where they start from the values and speeds there."""
         if not self.variables:
             return states.copy()
+        found = np.empty((len(states), self.size))
         first = 2 * len(self.order)
-        return np.array([y[:first] + self._starts(y) for y in states.tolist()])
+        found[:, :first] = states[:, :first]
+        if any(callable(item.start) for item in self.variables):
+            starts = [self._starts(y) for y in states.tolist()]
+            found[:, first:] = np.reshape(starts, (len(states), len(self.variables)))
+        else:
+            found[:, first:] = [item.start for item in self.variables]
+        return found
 
     def _starts(self, y: Sequence[float]) -> list[float]:
         """Where the auxiliary states start from values and speeds."""
