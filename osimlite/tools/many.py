@@ -13,9 +13,12 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
+from osimlite.document.kept import top_at
 from osimlite.errors import OsimliteError
 from osimlite.files import write_atomically
 from osimlite.records import dataclass, field
+from osimlite.schema.model import Model
+from osimlite.schema.sets import Set
 from osimlite.text import counted, listed
 from osimlite.tools.named_files import named_files
 from osimlite.tools.outcome import Outcome
@@ -68,16 +71,19 @@ class Interrupted(OsimliteError):
 def found(words: Iterable[str | Path]) -> list[Path]:
     """Files of setups from names and patterns such as ``subjects/*/setup_ik.xml``, in order, none twice.
 
+    A pattern finds no models and no sets, such as the loads or the markers that setups read.
+
     Raises:
         OsimliteError: a pattern matches nothing, or a folder is named.
     """
     files: dict[Path, None] = {}
     for word in map(str, words):
         if has_magic(word) and not os.path.exists(word):
-            matches = sorted(glob(word, recursive=True))
-            if not matches:
-                raise OsimliteError(f"no file matches '{word}'")
-            files.update((Path(match), None) for match in matches if Path(match).is_file())
+            matches = sorted(filter(os.path.isfile, glob(word, recursive=True)))
+            setups = [Path(match) for match in matches if not isinstance(top_at(match), Model | Set)]
+            if not setups:
+                raise OsimliteError(f"no {'setup' if matches else 'file'} matches '{word}'")
+            files.update(dict.fromkeys(setups))
         elif os.path.isdir(word):
             raise OsimliteError(
                 f"this is a folder; name the setups in it, as '{os.path.join(word, '*.xml')}'", file=word

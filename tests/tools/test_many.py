@@ -152,6 +152,14 @@ def test_two_that_write_one_file_are_told(trials: Path, monkeypatch: pytest.Monk
 def test_names_and_patterns(trials: Path) -> None:
     words: list[str | Path] = [trials / "trial1" / "id.xml", f"{trials}/**/id.xml"]
     assert found(words) == [trials / f"trial{k}" / "id.xml" for k in (1, 0, 2)]
+    osimlite.write(osimlite.ExternalLoads(name="loads"), trials / "trial0" / "grf.xml")
+    osimlite.write(osimlite.IKTaskSet(name="tasks"), trials / "trial0" / "tasks.xml")
+    (trials / "trial0" / "broken.xml").write_text("<OpenSimDocument")
+    names = [path.name for path in found([f"{trials}/**/*"]) if path.suffix in (".xml", ".osim")]
+    assert sorted(names) == ["broken.xml", *["id.xml"] * 3, *["z_ik.xml"] * 3], "models and sets are no setups"
+    assert found([trials / "model.osim"]) == [trials / "model.osim"], "what is named is meant"
+    with pytest.raises(OsimliteError, match=r"no setup matches '.*/grf\*\.xml'"):
+        found([f"{trials}/trial0/grf*.xml"])
     with pytest.raises(OsimliteError, match=r"no file matches 'nothing\*\.xml'"):
         found(["nothing*.xml"])
 
