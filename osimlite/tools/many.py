@@ -22,7 +22,7 @@ from osimlite.schema.sets import Set
 from osimlite.text import counted, listed
 from osimlite.tools.named_files import named_files
 from osimlite.tools.outcome import Outcome
-from osimlite.tools.running import run
+from osimlite.tools.running import run, runnable
 
 JOURNAL = ".osimlite-run.jsonl"
 """Where it is noted which setups are done, until all are: in the folder of the results, or where the program runs."""
@@ -334,9 +334,15 @@ class _Work:
 
 
 def _needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
-    """Which other setups make what a setup names, by the names of files in them; never two each other's."""
+    """Which other setups make what a setup names, by the names of files in them; never two each other's.
+
+    Of those that cannot be run here, another program may have made it.
+    """
     makers: dict[str, Path] = {}
+    tools = runnable()
     for setup in setups:
+        if type(top_at(str(setup))).__name__ not in tools:
+            continue
         makers.update((os.path.realpath(name), setup) for name in named_files(str(setup), "output-file"))
     needs: dict[Path, list[Path]] = {}
     for setup in setups:

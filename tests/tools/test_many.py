@@ -124,6 +124,16 @@ def test_warnings_of_each_are_told_in_the_table(trials: Path) -> None:
     assert "trial1/trial.trc:3:" in alone.err and "Found 1 warning in 1 file." in alone.err
 
 
+def test_what_another_program_made_is_taken(trials: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A setup that cannot be run here keeps none waiting for what it made elsewhere."""
+    monkeypatch.chdir(trials)
+    osimlite.run(trials / "trial0" / "z_ik.xml")
+    other = osimlite.RRATool(name="rra", output_model_file="../model.osim", model_file="../first.osim")
+    osimlite.write(other, trials / "trial0" / "rra.xml")
+    refused, done = run_many([trials / "trial0" / "rra.xml", trials / "trial0" / "id.xml"])
+    assert (refused.status, done.status) == ("failed", "done")
+
+
 def test_what_is_read_makes_the_digest(trials: Path) -> None:
     setup = trials / "trial0" / "z_ik.xml"
     before = digest_of(setup)
