@@ -70,10 +70,11 @@ def _followed(
     recorded = recorded.between(setup.initial_time, setup.final_time)
     # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints change the values.
     given = job.path("speeds_file")
+    others: dict[int, Array] = {}
     if given is None:
         speeds = recorded.rates[0]
     else:
-        own, speeds = _given(job, given, recorded)
+        own, speeds, others = _given(job, given, recorded, simulation)
     if simulation.constraints:
         recorded = recorded.assembled()
         if not model.constraint_set.objects:
@@ -81,13 +82,24 @@ def _followed(
             moments = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
             speeds = np.array([mechanism.project_speeds(q, u, time) for time, q, u in moments])
     rows = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
-    states = ((t, simulation.state.pack(q.tolist(), u.tolist())) for t, q, u in rows)
+
+    def states() -> Iterator[tuple[float, list[float]]]:
+        for number, (t, q, u) in enumerate(rows):
+            y = simulation.state.pack(q.tolist(), u.tolist())
+            for place, column in others.items():
+                y[place] = float(column[number])
+            yield t, y
+
     first = int(np.searchsorted(before.times, recorded.times[0]))
-    return first, states, lambda: (before.times, before.rates[0]) if given is None else own
+    return first, states(), lambda: (before.times, before.rates[0]) if given is None else own
 
 
-def _given(job: Job, path: Path, recorded: RecordedMotion) -> tuple[Record, Array]:
-    """Times and speeds of a file, and its speeds (t, n) at the times of a motion; those without a column are zero.
+def _given(
+    job: Job, path: Path, recorded: RecordedMotion, simulation: Simulation
+) -> tuple[Record, Array, dict[int, Array]]:
+    """Times and speeds of a file, and at those of a motion its speeds (t, n) and its auxiliary states (t,) by place.
+
+    Speeds without a column have their default values.
 
     Raises:
         DocumentError: the file has no speeds, or lacks a time.
@@ -97,11 +109,14 @@ def _given(job: Job, path: Path, recorded: RecordedMotion) -> tuple[Record, Arra
     columns = columns_of_states(table.columns, paths)
     if not columns:
         raise job.error(f"'{path}' has no column with a speed of the model")
-    speeds = np.zeros((len(table.times), len(infos)))
+    speeds = np.tile([float(info.default_speed) for info in infos], (len(table.times), 1))
     rows = np.searchsorted(table.times, recorded.times - SAME_TIME)
     for row, time in zip(rows.tolist(), recorded.times.tolist(), strict=True):
         if row == len(table.times) or abs(table.times[row] - time) > SAME_TIME:
             raise job.error(f"'{path}' has no row at {time:.15g} s, at which there are coordinates; give it one")
     for name, place in columns.items():
         speeds[:, paths.index(name)] = table.rows[:, place]
-    return (table.times, speeds), speeds[rows]
+    state = simulation.state
+    first, auxiliary = 2 * len(state.order), columns_of_states(table.columns, state.paths)
+    others = {first + state.paths.index(name): table.rows[rows, place] for name, place in auxiliary.items()}
+    return (table.times, speeds), speeds[rows], others

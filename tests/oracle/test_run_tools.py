@@ -17,6 +17,7 @@ from osimlite.models.jumper import jumper
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.joints import ScapulothoracicJoint
 from osimlite.schema.model import Model
+from osimlite.schema.muscles import Muscle
 from osimlite.simulation.files.storage import read_sto, write_sto
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
@@ -180,6 +181,23 @@ def test_speeds_of_a_file(
     rows = np.stack([np.cos(3.0 * times + k) for k in range(count)], axis=1)
     write_sto(tmp_path / "speeds.sto", "speeds", times.tolist(), names, rows.tolist(), in_degrees=in_degrees)
     compare(*both(tmp_path, model, "AnalyzeTool", SPEEDS), 1e-8, 1e-8)
+
+
+def test_other_states_beside_speeds_count(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Values do not, and a speed without a column is the default one."""
+    monkeypatch.chdir(tmp_path)
+    model = osimlite.read(real(corpus, "m0001"))
+    first, second = model.components(Coordinate)
+    first.default_speed_value = 0.5
+    muscle = next(iter(model.components(Muscle))).name
+    labels = [f"{second.name}_u", first.name, f"{muscle}.activation", f"/forceset/{muscle}/fiber_length"]
+    times = np.linspace(0.0, 0.5, 26)
+    rows = np.array([0.1, 0.3, 0.4, 0.1]) + 0.05 * np.sin(7.0 * times[:, None] + np.arange(4))
+    write_sto(tmp_path / "speeds.sto", "speeds", times.tolist(), labels, rows.tolist())
+    more = SPEEDS.replace("<objects>", '<objects><StatesReporter name="S"/>')
+    ours, theirs = both(tmp_path, model, "AnalyzeTool", more)
+    compare(ours, theirs, 1e-8, 1e-8)
+    assert read_sto(theirs / "it_S_states.sto")[f"/forceset/{muscle}/activation"].min() > 0.3
 
 
 def test_speeds_of_other_times_are_told(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
