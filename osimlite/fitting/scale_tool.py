@@ -89,18 +89,25 @@ def scale(
         SettingError: something names what is not there, a factor is not positive, or markers are needed and not given.
     """
     copy = model.copy_deep()
-    wanted = measurements if not isinstance(measurements, Mapping) else _measurements(measurements)
     measuring = Measuring(copy)
+
+    def expect_body(name: str) -> None:
+        if name not in measuring.frames:
+            raise SettingError(f"'{model.name}' has no body '{name}'{did_you_mean(name, measuring.frames)}")
+
+    if isinstance(measurements, Mapping):
+        measurements = _measurements(measurements)
+        for body in (body for item in measurements for body in item.body_scale_set.objects):
+            expect_body(body.name)
     data = None if static is None else MarkerData.of(static)
-    wanted = list(wanted)
+    wanted = list(measurements)
     if (wanted or place) and data is None:
         raise SettingError("the subject is to be measured, and there are no markers of it; give them")
     if data is not None and wanted:
         measuring.by_measurements(wanted, data, start, end)
     by_hand = []
     for name, given in (factors or {}).items():
-        if name not in measuring.frames:
-            raise SettingError(f"'{model.name}' has no body '{name}'{did_you_mean(name, measuring.frames)}")
+        expect_body(name)
         three = (given, given, given) if isinstance(given, int | float) else tuple(given)
         if not all(0.0 < number < math.inf for number in three):
             numbers = ", ".join(f"{number:g}" for number in three)

@@ -57,6 +57,7 @@ def test_a_trial_is_fitted(lab: Path) -> None:
         (("scale", "box.osim", "walk.trc", "--distance", "b=one"), "'one' names no pair of markers for 'b'"),
         (("scale", "box.osim", "--factor", "b=1,2"), "'1,2' are no factors for 'b'"),
         (("scale", "box.osim", "--factor", "c=2"), "'box' has no body 'c'"),
+        (("scale", "box.osim", "walk.trc", "--distance", "c.X=one:two"), "'box' has no body 'c'"),
         (("scale", "box.osim", "--factor", "b=0"), "factors of 'b' are positive numbers, not 0, 0, 0"),
         (("scale", "box.osim", "--factor", "b=1,-2,1"), "factors of 'b' are positive numbers, not 1, -2, 1"),
         (("scale", "box.osim", "walk.trc", "--distance", "b.XQ=one:two"), "'XQ' of 'b' are no axes"),
