@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.errors import DocumentError, SimulationError
+from osimlite.errors import DocumentError, SettingError, SimulationError
 from osimlite.files import make_folder, written_atomically
 from osimlite.lint.diagnostic import Finding
 from osimlite.records import dataclass, field, replace
@@ -18,6 +18,8 @@ from osimlite.simulation.files.storage import StoTable, adapter_lines
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.named_files import is_input
 
+MOST_DIGITS = 1074
+"""Behind the point of a number, of which the last is no zero."""
 DYNAMICS = "Inverse Dynamics Generalized Forces"
 """The name of the table that inverse dynamics gives."""
 
@@ -56,10 +58,15 @@ class Outcome:
             path: of the file.
             table: what is printed.
             description: what the header says besides.
-            precision: digits behind the point.
+            precision: digits behind the point; OpenSim takes a negative number for none.
+
+        Raises:
+            SettingError: they are more than any number has.
         """
+        if precision > MOST_DIGITS:
+            raise SettingError(f"output_precision is {precision}; give the digits behind the point, {PRECISION} or 16")
         self.tables[path.name] = replace(table, file=str(path))
-        self._texts[path] = printed(table, description, precision)
+        self._texts[path] = printed(table, description, max(precision, 0))
 
     def new_table(self, path: Path, table: StoTable) -> None:
         """Have a table written in the newer form of OpenSim's storage files, with its own header."""

@@ -126,3 +126,18 @@ def test_nothing_is_computed_from_what_an_earlier_run_has_left(trial: Path, work
     assert done.code == 2 and found["z_ik.xml"]["status"] == "done" and found["id.xml"]["status"] == "not run"
     assert found["id.xml"]["message"] == "it needs what z_ik.xml makes, and -o puts that elsewhere; leave out -o"
     assert not (trial / "new" / "id").exists() and (trial / "new" / "z_ik" / "ik.mot").is_file()
+
+
+@pytest.mark.parametrize(("precision", "time"), [(-3, "       0"), (0, "       0"), (12, "      0.200000000000")])
+def test_digits_behind_the_point(trial: Path, precision: int, time: str) -> None:
+    """As OpenSim 4.6 prints them."""
+    change(trial / "forward.xml", "<initial_time>", f"<output_precision>{precision}</output_precision><initial_time>")
+    osimlite.run(trial / "forward.xml")
+    rows = (trial / "moved" / "fw_states.sto").read_text().partition("endheader\n")[2].splitlines()
+    assert rows[1].split("\t")[0] == time
+
+
+def test_more_digits_than_there_are(trial: Path) -> None:
+    change(trial / "forward.xml", "<initial_time>", "<output_precision>3000000000</output_precision><initial_time>")
+    with pytest.raises(OsimliteError, match="output_precision"):
+        osimlite.run(trial / "forward.xml")
