@@ -11,6 +11,7 @@ import pytest
 import osimlite
 from osimlite.models.jumper import jumper
 from osimlite.schema.actuators import ScalarActuator
+from osimlite.schema.constraint_types import RollingOnSurfaceConstraint
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
 from osimlite.simulation.files.storage import read_sto, write_sto
@@ -81,3 +82,14 @@ def test_forces_of_constraints(corpus: Any, tmp_path: Path, monkeypatch: pytest.
     assert any("_mobility_F0" in label or "_Fx" in label for label in read_sto(theirs / "it_F_forces.sto").columns)
     largest = max(np.abs(read_sto(file).rows).max() for file in theirs.iterdir())
     compare(ours, theirs, 1e-8, 1e-10 * largest)
+
+
+def test_what_rolls_on_a_surface_is_free(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """OpenSim's tools never turn such constraints on, whatever `isEnforced` says."""
+    monkeypatch.chdir(tmp_path)
+    model = osimlite.read(real(corpus, "m0001"))
+    bodies = [model.tree().path_of(body) or "" for body in model.body_set.objects]
+    model.add(RollingOnSurfaceConstraint(name="roll", socket_rolling_body=bodies[-1], socket_surface_body=bodies[0]))
+    ours, theirs = both(tmp_path, model, "AnalyzeTool", CONSTRAINED.format(joints="ALL"))
+    assert not any("roll" in label for label in read_sto(theirs / "it_F_forces.sto").columns)
+    compare(ours, theirs, 1e-8, 1e-8)
