@@ -142,6 +142,7 @@ def told(motion: FittedMotion) -> Iterator[str]:
         parts = [f"{name} ({100.0 * part:.3g} %)" for name, part in found["partly_unseen"].items()]
         yield f"not seen in every frame: {listed(parts)}"
     if found["frames_unseen"]:
-        yield f"{counted(found['frames_unseen'], 'frame')} in which nothing was seen: the pose stays as it was before"
+        frames = counted(found["frames_unseen"], "frame")
+        yield f"{frames} in which nothing with a weight was seen: the pose stays as it was before"
     if found["frames_unsettled"]:
         yield f"in {counted(found['frames_unsettled'], 'frame')} the best pose was not reached"

@@ -141,3 +141,9 @@ def test_more_digits_than_there_are(trial: Path) -> None:
     change(trial / "forward.xml", "<initial_time>", "<output_precision>3000000000</output_precision><initial_time>")
     with pytest.raises(OsimliteError, match="output_precision"):
         osimlite.run(trial / "forward.xml")
+
+
+def test_markers_without_weights_are_not_told_to_be_unseen(trial: Path) -> None:
+    """The weight of a task of OpenSim's is 0 unless it is given."""
+    told = dict(osimlite.run(trial / "scale.xml").told)
+    assert told["markers"] == "1 frame in which nothing with a weight was seen: the pose stays as it was before"
