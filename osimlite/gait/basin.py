@@ -106,15 +106,15 @@ def walks_from(
         accuracy: of the integrator.
         progress: called now and then.
     """
-    found: list[Walk] = []
+    result: list[Walk] = []
     for first in range(0, len(states), AT_ONCE):
-        found += walk_many(
+        result += walk_many(
             step_map.engine, states[first : first + AT_ONCE], 1.5 * wanted * cycle.period, footing=step_map.footing,
             accuracy=accuracy, threads=step_map.threads,
         )  # fmt: skip
         if progress is not None:
-            progress(len(found), len(states))
-    return found
+            progress(len(result), len(states))
+    return result
 
 
 def find_basin(

@@ -215,13 +215,13 @@ class CycleSearch:
             seed: of the random numbers.
             progress: called with how many have walked, and of how many.
         """
-        rng, found = np.random.default_rng(seed), []
+        rng, result = np.random.default_rng(seed), []
         for first in range(0, count, AT_ONCE):
             size = min(AT_ONCE, count - first)
-            found += self._drawn(rng, size)
+            result += self._drawn(rng, size)
             if progress is not None:
                 progress(first + size, count)
-        return sorted(found, key=lambda candidate: candidate.miss)
+        return sorted(result, key=lambda candidate: candidate.miss)
 
     def _drawn(self, rng: np.random.Generator, count: int) -> list[Candidate]:
         engine: Any = self.variants.given.engine
@@ -313,13 +313,15 @@ class CycleSearch:
             OsimliteError: there is none near, or no such model.
         """
         step_map = self.step_map(fractions, state, TIGHT if fine else FINE)
-        found = find_cycle(step_map, state, converged=CONVERGED if fine else NEAR, most_steps=MOST_STEPS if fine else 8)
-        cost, walking = found.largest + SCUFFED * found.scuffs, 0.0
+        result = find_cycle(
+            step_map, state, converged=CONVERGED if fine else NEAR, most_steps=MOST_STEPS if fine else 8
+        )
+        cost, walking = result.largest + SCUFFED * result.scuffs, 0.0
         if cost < self.stable or fine:
-            walking = self._walking(step_map, found)
+            walking = self._walking(step_map, result)
         if cost < self.stable:
             cost = self.stable - walking
-        return Found(np.array(fractions), self.numbers(fractions), found, walking, cost)
+        return Found(np.array(fractions), self.numbers(fractions), result, walking, cost)
 
     def _walking(self, step_map: StepMap, cycle: Cycle) -> float:
         """Which part of the walkers that start near a cycle walk."""
@@ -403,12 +405,12 @@ class _Closing:
         _, step_map, state = self.at(unknowns)
         columns = [step_matrix(step_map, state, DIFFERENCE) - np.eye(self._size)]
         here = self.miss(unknowns)
-        for place in range(self._size, len(unknowns)):
+        for index in range(self._size, len(unknowns)):
             column = np.full(self._size, np.nan)
             for shift in (SHIFT, -SHIFT):
                 moved = unknowns.copy()
-                moved[place] += shift
-                if 0.0 <= moved[place] <= 1.0 and (there := self.miss(moved))[0] != LOST:
+                moved[index] += shift
+                if 0.0 <= moved[index] <= 1.0 and (there := self.miss(moved))[0] != LOST:
                     column = (there - here) / shift
                     break
             columns.append(column[:, None])

@@ -92,7 +92,7 @@ def _feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str, ...]
             f"'{mechanism.name}' touches the ground with the ends of {counted(len(ends), 'leg')} ({names}), not of "
             "two; say which contacts are feet with --foot"
         )
-    found = []
+    result = []
     for end in ends:
         own = [sole for sole in soles if sole.body == end]
         farthest = max(sole.reach for sole in own)
@@ -102,28 +102,28 @@ def _feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str, ...]
         shared = set.intersection(*(above[body] for body in ends))
         leg = above[end] - shared
         behind = [sole for sole in soles if sole.body in leg and _OF_A_FOOT.search(sole.words)]
-        found.append(tuple(sole.contact for sole in (*behind, *(named or likely))))
-    return tuple(found)
+        result.append(tuple(sole.contact for sole in (*behind, *(named or likely))))
+    return tuple(result)
 
 
 def _soles(engine: BatchEngine) -> list[_Sole]:
-    found = []
+    result = []
     for element in engine.forces.elements:
         if not isinstance(element, HuntCrossley):
             continue
-        for place, pair in enumerate(element.pairs):
+        for index, pair in enumerate(element.pairs):
             plane, sphere = element.surfaces[pair.first], element.surfaces[pair.second]
             if plane.is_half_space and not sphere.radii and sphere.body != GROUND:
                 held = engine.mechanism.bodies[sphere.body].mobilizer.child_frame[:3, 3]
                 reach = sum((a - b) ** 2 for a, b in zip(sphere.center, held.tolist(), strict=True)) ** 0.5
-                name = element.pair_name(place)
-                found.append(_Sole(name, f"{name} {sphere.name}", sphere.body, reach))
-    return found
+                name = element.pair_name(index)
+                result.append(_Sole(name, f"{name} {sphere.name}", sphere.body, reach))
+    return result
 
 
 def _above(mechanism: Mechanism, body: int) -> list[int]:
     """The bodies that carry a body."""
-    found: list[int] = []
+    result: list[int] = []
     while (body := mechanism.bodies[body].parent) != GROUND:
-        found.append(body)
-    return found
+        result.append(body)
+    return result

@@ -180,9 +180,9 @@ def closed(
     for number, candidate in enumerate(candidates):
         if progress is not None:
             progress(number, len(candidates))
-        found = search.close(candidate)
-        if found is not None:
-            cycles.append(found)
+        result = search.close(candidate)
+        if result is not None:
+            cycles.append(result)
         if len(cycles) == enough:
             break
     if not cycles:
@@ -248,15 +248,15 @@ def _write(folder: Path, search: CycleSearch, gait: Gait, cycles: Sequence[Found
         numbers = [*each.numbers.values(), cycle.largest, each.walking, cycle.length, cycle.period, cycle.scuffs]
         rows.append(",".join(repr(number) for number in numbers))
     write_atomically(folder / CYCLES, "\n".join(rows) + "\n")
-    found, walk = gait.found, gait.walk
+    result, walk = gait.found, gait.walk
     summary = {
-        "numbers": found.numbers,
+        "numbers": result.numbers,
         "start": {name: {"value": value, "speed": speed} for name, (value, speed) in gait.start.items()},
-        "largest_multiplier": found.cycle.largest,
-        "walking": found.walking,
-        "step_length_m": found.cycle.length,
-        "period_s": found.cycle.period,
-        "residual": found.cycle.residual,
+        "largest_multiplier": result.cycle.largest,
+        "walking": result.walking,
+        "step_length_m": result.cycle.length,
+        "period_s": result.cycle.period,
+        "residual": result.cycle.residual,
         "walk": {"steps": len(walk.steps), "scuffs": len(walk.scuffs), "end_s": walk.end, "ending": walk.ending},
         "candidates": gait.candidates,
         "settings": settings,

@@ -53,8 +53,8 @@ def progress(engine: Any, feet: Sequence[str] | None = None) -> Measure:
         rows = None if batch.numbers is None else np.arange(len(batch.starts))
         along = along_slope(batch.engine, batch.runs.states, batch.numbers, rows)[0]
         places = np.stack([along[:, foot].max(axis=1) for foot in contacts], axis=1)
-        found = zip(_walks(footing, batch), places.tolist(), strict=True)
-        return np.array([_progress(walk, ends) for walk, ends in found])
+        result = zip(_walks(footing, batch), places.tolist(), strict=True)
+        return np.array([_progress(walk, ends) for walk, ends in result])
 
     return _made("progress", footing, numbers)
 

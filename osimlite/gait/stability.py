@@ -86,14 +86,14 @@ class Improvement:
         if key not in self._costs:
             near = min((self._first, *self.cycles), key=lambda each: _far(each, fractions))
             try:
-                found = self._search.cycle(fractions, near.cycle.state)
+                result = self._search.cycle(fractions, near.cycle.state)
             except (OsimliteError, np.linalg.LinAlgError):
                 self._costs[key] = WORST + _far(near, fractions)
             else:
-                self._costs[key] = found.cost
-                self.cycles.append(found)
+                self._costs[key] = result.cost
+                self.cycles.append(result)
                 if rounds:
-                    self._written.append(found)
+                    self._written.append(result)
         return self._costs[key]
 
 

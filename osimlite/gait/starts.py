@@ -38,15 +38,15 @@ def carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
     poses = np.hstack((rng.uniform(-0.2, 0.2, (3, n)), np.zeros((3, n))))
     here, depths = _centres(engine, poses)[:, contacts], along_slope(engine, poses)[1][:, contacts]
     places, lift = [], None
-    for place in range(n):
+    for index in range(n):
         moved = poses.copy()
-        moved[:, place] += APART
+        moved[:, index] += APART
         way = ((_centres(engine, moved)[:, contacts] - here) / APART).reshape(-1, 3)
         if np.ptp(way, axis=0).max() > 1e-9 or np.linalg.norm(way[0]) < 1e-3:
             continue
-        places.append(place)
+        places.append(index)
         if lift is None and (along_slope(engine, moved)[1][:, contacts] - depths < -0.1 * APART).all():
-            lift = place
+            lift = index
     return Carriers(tuple(places), lift)
 
 
@@ -97,14 +97,14 @@ def planted(engine: BatchEngine, footing: FootContacts, states: Floats, *, numbe
         numbers: as in `stood`.
     """
     n, count = len(engine.order), np.arange(len(states))
-    found = carriers(engine, footing)
+    result = carriers(engine, footing)
     free = states.copy()
     # What comes out must not depend, by a rounding, on what was there.
-    free[:, [n + place for place in found.places]] = 0.0
-    if found.lift is not None:
-        free[:, found.lift] = 0.0
+    free[:, [n + place for place in result.places]] = 0.0
+    if result.lift is not None:
+        free[:, result.lift] = 0.0
     placed = stood(engine, footing, free, foot=-1, numbers=numbers)
-    if not found.places:
+    if not result.places:
         return placed
     rows = None if numbers is None else count
     feet = np.array([engine.contacts.index(name) for names in footing.feet for name in names])
@@ -116,12 +116,12 @@ def planted(engine: BatchEngine, footing: FootContacts, states: Floats, *, numbe
     speeds = ways[count, deepest] / (2.0 * NUDGE)
     carried = []
     here = _centres(engine, placed, numbers, rows)
-    for place in found.places:
+    for place in result.places:
         moved = placed.copy()
         moved[:, place] += APART
         carried.append((_centres(engine, moved, numbers, rows) - here)[count, deepest] / APART)
     needed = np.einsum("wi,wij->wj", speeds, np.linalg.pinv(np.stack(carried, axis=1)))
-    placed[:, [n + place for place in found.places]] -= needed
+    placed[:, [n + place for place in result.places]] -= needed
     return placed
 
 
@@ -131,9 +131,9 @@ def upright(states: Floats, neutral: Floats) -> Floats:
     A walker that may be anywhere, and whose trunk may be turned in any way, is then at the origin and not turned.
     """
     chosen: list[int] = []
-    for place in range(len(neutral)):
-        if np.linalg.matrix_rank(neutral[[*chosen, place]], tol=1e-6) > len(chosen):
-            chosen.append(place)
+    for index in range(len(neutral)):
+        if np.linalg.matrix_rank(neutral[[*chosen, index]], tol=1e-6) > len(chosen):
+            chosen.append(index)
     return states - np.linalg.solve(neutral[chosen], states[..., chosen].T).T @ neutral.T
 
 

@@ -191,7 +191,7 @@ class StepMap:
     def _single(self, states: Floats, leading: int) -> Images:
         """One step of the foot behind."""
         count, trailing = len(states), 1 - leading
-        found = Images(
+        result = Images(
             np.full(states.shape, np.nan),
             np.full(count, np.nan),
             np.full(count, np.nan),
@@ -199,7 +199,7 @@ class StepMap:
         )
         rows = np.flatnonzero(np.isfinite(states).all(axis=1))
         if not len(rows):
-            return found
+            return result
         # A foot of several contacts may touch with one of them while it stands on another.
         foot = self.footing.feet[trailing]
         stops = [Watch("strike", contact=foot[0], stops=1)] if len(foot) == 1 else []
@@ -212,11 +212,11 @@ class StepMap:
         for row, walk in zip(rows.tolist(), walks, strict=True):
             step = next((step for step in walk.steps if step.foot == trailing), None)
             if step is not None:
-                found.states[row] = self.land(step.state, trailing)
-                found.lengths[row], found.times[row] = step.length, step.time
+                result.states[row] = self.land(step.state, trailing)
+                result.lengths[row], result.times[row] = step.length, step.time
                 # The first foot touches down at the start, or a rounding later.
-                found.scuffs[row] = sum(AT_ONCE < scuff.time < step.time for scuff in walk.scuffs)
-        return found
+                result.scuffs[row] = sum(AT_ONCE < scuff.time < step.time for scuff in walk.scuffs)
+        return result
 
     # -------------------------------------------------------------------------------------------- coordinates
     def reduce(self, states: ArrayLike) -> Floats:

@@ -163,12 +163,12 @@ def walks_of(
     reached, depths = along_slope(engine, moments, vectors, rows)
     fatal = np.array([engine.contacts.index(contact) for contact in footing.falls], dtype=np.int64)
     ends = np.cumsum([len(starts), *counts])
-    found = []
+    result = []
     for k, events in enumerate(runs.events):
         part = slice(ends[k], ends[k + 1])
         if (depths[k, fatal] > 0.0).any():
             contact = footing.falls[int(np.argmax(depths[k, fatal]))]
-            found.append(Walk(0.0, "fell", contact))
+            result.append(Walk(0.0, "fell", contact))
             continue
         walk = follow(footing, engine.contacts, events, runs.event_states[k], reached[part], depths[k] > 0.0)
         if walk.walks:
@@ -177,8 +177,8 @@ def walks_of(
             walk.ending = "walking" if ending == "done" else ending
             if room is not None and counts[k] >= room:
                 walk.ending = "too many events"
-        found.append(walk)
-    return found
+        result.append(walk)
+    return result
 
 
 def follow(
@@ -199,7 +199,7 @@ def follow(
         reached: how far down the slope each contact is at the events (as many, P), m.
         touching: which contacts push at the start (P,).
     """
-    places = {name: place for place, name in enumerate(contacts)}
+    places = {name: index for index, name in enumerate(contacts)}
     feet = [np.array([places[contact] for contact in foot]) for foot in footing.feet]
     walk, foot_of = Walk(), footing.foot_of
     down = [{name for name in foot if touching[places[name]]} for foot in footing.feet]

@@ -34,10 +34,10 @@ def leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayLike) 
     """
     mechanism = engine.mechanism
     body_of = {
-        element.pair_name(place): element.surfaces[pair.second].body
+        element.pair_name(index): element.surfaces[pair.second].body
         for element in engine.forces.elements
         if isinstance(element, HuntCrossley)
-        for place, pair in enumerate(element.pairs)
+        for index, pair in enumerate(element.pairs)
     }
     legs = []
     for foot in footing.feet:
@@ -89,21 +89,21 @@ def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> Non
     before = np.stack([_effects(engine, state)[:, columns] for state in states], axis=1)
     after = np.stack([_effects(engine, state[source]) for state in states], axis=1)
     tolerances = SAME * np.abs(before).max(axis=(0, 1))
-    for place, effects in enumerate(after):
+    for index, effects in enumerate(after):
         alike = np.flatnonzero((np.abs(before - effects) <= tolerances).all(axis=(1, 2)))
-        if len(alike) and place not in alike:
-            source[first + place] = first + alike[0]
+        if len(alike) and index not in alike:
+            source[first + index] = first + alike[0]
 
 
 def _effects(engine: BatchEngine, state: Floats) -> Floats:
     """What each auxiliary state (z) does: by how much it changes the other rates (2n) and its own, and that rate."""
     first, here = 2 * len(engine.order), np.array(engine.derivative(0.0, state.tolist()))
     rows = []
-    for place in range(first, len(state)):
+    for index in range(first, len(state)):
         moved = state.copy()
-        moved[place] += NUDGE
+        moved[index] += NUDGE
         slope = (np.array(engine.derivative(0.0, moved.tolist())) - here) / NUDGE
-        rows.append([*slope[:first], slope[place], here[place]])
+        rows.append([*slope[:first], slope[index], here[index]])
     return np.array(rows)
 
 
@@ -121,9 +121,9 @@ def neutral_directions(engine: BatchEngine, states: ArrayLike) -> Floats:
     usual = float(np.median([uneven for _, uneven in found_slopes]))
     slopes = [slope for slope, uneven in found_slopes if uneven <= UNEVEN * usual]
     size = slopes[0].shape[0]
-    found = np.zeros((size, 0))
+    result = np.zeros((size, 0))
     while True:
-        rest = np.eye(size) - found @ found.T
+        rest = np.eye(size) - result @ result.T
         rows = np.concatenate([rest @ slope for slope in slopes])
         sizes = np.linalg.norm(rows, axis=1)
         rows = rows[sizes > SAME] / sizes[sizes > SAME, None]
@@ -131,9 +131,9 @@ def neutral_directions(engine: BatchEngine, states: ArrayLike) -> Floats:
         _, values, vectors = np.linalg.svd(np.linalg.qr(rows, mode="r"))
         values = np.concatenate((values, np.zeros(size - len(values))))
         larger = vectors[values < SAME * values[0]].T
-        if larger.shape[1] <= found.shape[1]:
-            return found
-        found = larger
+        if larger.shape[1] <= result.shape[1]:
+            return result
+        result = larger
 
 
 def derivative_matrix(engine: BatchEngine, state: Floats) -> tuple[Floats, float]:

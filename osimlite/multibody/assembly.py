@@ -46,16 +46,18 @@ def assembled(mechanism: Mechanism, q: Array, time: float, kept: Collection[int]
     infos = mechanism.coordinates
     held = {place: float(q[place]) for place, info in enumerate(infos) if info.locked or place in kept}
     while True:
-        found = _nearest(mechanism, q, time, held)
+        result = _nearest(mechanism, q, time, held)
         outside = {
-            place: float(np.clip(found[place], *info.range))
+            place: float(np.clip(result[place], *info.range))
             for place, info in enumerate(infos)
-            if info.clamped and place not in held and not info.range[0] - 1e-12 <= found[place] <= info.range[1] + 1e-12
+            if info.clamped
+            and place not in held
+            and not info.range[0] - 1e-12 <= result[place] <= info.range[1] + 1e-12
         }
         if not outside:
-            return found
+            return result
         # Whichever would leave its range furthest stays at the end of it; then the others may fit.
-        worst = max(outside, key=lambda place: abs(outside[place] - found[place]))
+        worst = max(outside, key=lambda place: abs(outside[place] - result[place]))
         held[worst] = outside[worst]
 
 
@@ -117,7 +119,7 @@ class _Search:
     def __init__(self, mechanism: Mechanism, wanted: Array, time: float, held: Mapping[int, float]) -> None:
         self.mechanism, self.wanted, self.time = mechanism, wanted, time
         self.counted = np.array([0.0 if info.yielding else 1.0 for info in mechanism.coordinates])
-        self.free = [place for place in range(len(wanted)) if place not in held]
+        self.free = [index for index in range(len(wanted)) if index not in held]
         self.start = wanted.copy()
         self.start[list(held)] = list(held.values())
         self.tolerance = max(mechanism.assembly_accuracy / 10.0, _FINEST)

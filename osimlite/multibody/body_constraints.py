@@ -69,12 +69,12 @@ def meeting(state: Kinematics, first: StationPlacement, second: StationPlacement
 
 def carrier(mechanism: Mechanism, bodies: Iterable[int]) -> int:
     """The outermost body that carries bodies, or is one of them; -1 for ground."""
-    found = set(bodies)
-    while len(found) > 1:
+    result = set(bodies)
+    while len(result) > 1:
         # Bodies follow what carries them.
-        outer = max(found)
-        found = found - {outer} | {mechanism.bodies[outer].parent}
-    return found.pop()
+        outer = max(result)
+        result = result - {outer} | {mechanism.bodies[outer].parent}
+    return result.pop()
 
 
 def direction(state: Kinematics, body: int, axis: Array) -> MovingVector:

@@ -230,8 +230,8 @@ class _Builder:
         """The joint that OpenSim makes for a body that nothing connects to ground."""
         name, motions = f"free_{_last(body)}", MOTIONS["FreeJoint"]
         path, first = f"{self.placements.path(self.model.joint_set)}/{name}", len(self.coordinates)
-        for place, motion_type in enumerate(motion_types(motions, 6)):
-            own = f"{name}_coord_{place}"
+        for index, motion_type in enumerate(motion_types(motions, 6)):
+            own = f"{name}_coord_{index}"
             self.coordinates.append(CoordinateInfo(own, f"{path}/{own}", path, motion_type))
         own_places, still = tuple(range(first, first + 6)), np.eye(4)
         return _Edge("FreeJoint", path, ground, body, still, still, motions, own_places)

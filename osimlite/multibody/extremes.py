@@ -59,13 +59,13 @@ def methods_of_any_numbers(cls: C) -> C:
 def extreme(model: Model) -> str:
     """The number of a model that is furthest from what models have, with its place; empty if all are usual."""
     tree = model.tree()
-    found = [
+    result = [
         (size, f"{name} of '{tree.path_of(component)}', {number:g},")
         for component in tree.components
         for name, number in _numbers(component)
         if (size := _size(number))
     ]
-    return max(found)[1] if found else ""
+    return max(result)[1] if result else ""
 
 
 def _size(number: float) -> float:

@@ -102,9 +102,9 @@ def kinematics(
 
 
 def _with_carriers(mechanism: Mechanism, bodies: Iterable[int]) -> set[int]:
-    found: set[int] = set()
+    result: set[int] = set()
     for body in bodies:
-        while body >= 0 and body not in found:
-            found.add(body)
+        while body >= 0 and body not in result:
+            result.add(body)
             body = mechanism.bodies[body].parent
-    return found
+    return result

@@ -106,10 +106,10 @@ def _derivative(points: Array, pieces: Array, at: Array, order: int) -> Array:
     """A derivative (j, k) at j places of the splines of `_pieces`."""
     place = np.searchsorted(points, at, side="right")
     t, own = (at - points[np.maximum(place - 1, 0)])[:, None], pieces[place]
-    found = np.zeros_like(own[:, 0])
+    result = np.zeros_like(own[:, 0])
     for power in range(pieces.shape[1] - 1, order - 1, -1):
-        found = found * t + math.perm(power, order) * own[:, power]
-    return found
+        result = result * t + math.perm(power, order) * own[:, power]
+    return result
 
 
 def _pieces(points: Array, values: Array, half_order: int) -> Array:
@@ -138,10 +138,10 @@ def _derivatives(points: Array, values: Array, half_order: int) -> Array:
     They make the sum of the integrals of the squared m-th derivative a minimum: each interval is a beam with as many
     freedoms at both ends.
     """
-    found = np.empty((len(points), half_order, values.shape[1]))
-    found[:, 0] = values
+    result = np.empty((len(points), half_order, values.shape[1]))
+    result[:, 0] = values
     if half_order == 1:
-        return found
+        return result
     width, (_, bending) = np.diff(points), _unit_interval(half_order)
     powers = np.tile(width[:, None] ** np.arange(half_order), 2)
     stiffness = bending * powers[:, :, None] * powers[:, None, :] * width[:, None, None] ** (1 - 2 * half_order)
@@ -152,8 +152,8 @@ def _derivatives(points: Array, values: Array, half_order: int) -> Array:
     rise, right = np.diff(values, axis=0)[:, None], np.zeros((len(points), half_order - 1, values.shape[1]))
     right[:-1] -= stiffness[:, one, half_order, None] * rise
     right[1:] -= stiffness[:, two, half_order, None] * rise
-    found[:, 1:] = _chained(diagonal, stiffness[:, one, two], right)
-    return found
+    result[:, 1:] = _chained(diagonal, stiffness[:, one, two], right)
+    return result
 
 
 @cache
@@ -200,12 +200,12 @@ def _chained(diagonal: Array, beside: Array, right: Array) -> Array:
     back = behind.transpose(0, 2, 1)
     kept[1 : 1 + count] -= back @ from_behind[:count]
     sides[1 : 1 + count] -= back @ own[:count]
-    found = np.empty_like(right)
-    found[::2] = half = _chained(kept, -before[:count] @ from_behind[:count], sides)
+    result = np.empty_like(right)
+    result[::2] = half = _chained(kept, -before[:count] @ from_behind[:count], sides)
     own -= from_before @ half[: len(before)]
     own[:count] -= from_behind[:count] @ half[1 : 1 + count]
-    found[1::2] = own
-    return found
+    result[1::2] = own
+    return result
 
 
 def _smoothed(points: Array, values: Array, half_order: int, error_variance: float) -> Array:

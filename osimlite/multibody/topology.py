@@ -64,15 +64,15 @@ def spanning_tree(links: Sequence[L], ground: str, masses: Mapping[str, float]) 
 
     def onward(inner: str) -> int | None:
         """The joint to the heaviest body beyond, forward joints first, joints to bodies without mass last."""
-        found: list[tuple[float, bool, int]] = []
+        result: list[tuple[float, bool, int]] = []
         for place, link in enumerate(links):
             if place not in used and inner in (link.parent, link.child):
                 backward = link.child == inner
                 outer = link.parent if backward else link.child
                 if outer not in levels:
-                    found.append((masses.get(outer, 0.0), not backward, -place))
-        heavy = [item for item in found if item[0] > 0.0]
-        best = max(heavy, key=lambda item: (item[1], item[0], item[2])) if heavy else max(found, default=None)
+                    result.append((masses.get(outer, 0.0), not backward, -place))
+        heavy = [item for item in result if item[0] > 0.0]
+        best = max(heavy, key=lambda item: (item[1], item[0], item[2])) if heavy else max(result, default=None)
         return None if best is None else -best[2]
 
     level = 0

@@ -64,11 +64,11 @@ def _shown(value: object) -> str:
 @cache
 def _described(module: str) -> dict[tuple[str, str], str]:
     """The texts below the declarations of a module, by class and property. Python itself drops them."""
-    found: dict[tuple[str, str], str] = {}
+    result: dict[tuple[str, str], str] = {}
     try:
         source = inspect.getsource(import_module(module))
     except OSError:
-        return found
+        return result
     for node in ast.parse(source).body:
         if not isinstance(node, ast.ClassDef):
             continue
@@ -76,5 +76,5 @@ def _described(module: str) -> dict[tuple[str, str], str]:
             is_field = isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
             if is_field and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
                 assert isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
-                found[node.name, field.target.id] = inspect.cleandoc(str(text.value.value))
-    return found
+                result[node.name, field.target.id] = inspect.cleandoc(str(text.value.value))
+    return result

@@ -122,8 +122,8 @@ def _listed(value: Any) -> list[Object]:
 
 def _unique(items: list[Object]) -> dict[str, Object]:
     """The objects by name; none if a name is missing, or there twice."""
-    found = {item.name: item for item in items}
-    return found if len(found) == len(items) and "" not in found else {}
+    result = {item.name: item for item in items}
+    return result if len(result) == len(items) and "" not in result else {}
 
 
 def _kind(item: Object) -> str:

@@ -250,9 +250,9 @@ def class_in(annotation: Any) -> type[Object] | None:
     if isinstance(annotation, type) and hasattr(annotation, "field_specs"):
         return annotation
     for argument in getattr(annotation, "__args__", ()):
-        found = class_in(argument)
-        if found is not None:
-            return found
+        result = class_in(argument)
+        if result is not None:
+            return result
     return None
 
 

@@ -48,8 +48,8 @@ def json_schema(tag: str = "Model") -> dict[str, Any]:
 
 
 def _classes() -> list[type[Object]]:
-    found: list[type[Object]] = [getattr(import_module(module), name) for name, module in MODULES.items()]
-    return sorted((cls for cls in found if not cls.abstract), key=lambda cls: cls.tag)
+    result: list[type[Object]] = [getattr(import_module(module), name) for name, module in MODULES.items()]
+    return sorted((cls for cls in result if not cls.abstract), key=lambda cls: cls.tag)
 
 
 def _definition(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any]:
@@ -93,8 +93,8 @@ def _content(spec: FieldSpec, classes: list[type[Object]]) -> dict[str, Any]:
     if isinstance(spec.kind, Reference):
         return {"type": "array", "items": {"type": "string"}} if spec.kind.shape == "list" else {"type": "string"}
     assert isinstance(spec.kind, Value)
-    found = _value(spec.kind)
-    return {**found, "default": spec.default} if _is_plain(spec.default) else found
+    result = _value(spec.kind)
+    return {**result, "default": spec.default} if _is_plain(spec.default) else result
 
 
 def _held(spec: FieldSpec, kind: Held, classes: list[type[Object]]) -> dict[str, Any]:
@@ -133,8 +133,8 @@ def _value(kind: Value) -> dict[str, Any]:
     if kind.shape == "optional":
         return {"anyOf": [scalar, {"type": "null"}]}
     bounds = {"minItems": kind.size or kind.least, "maxItems": kind.size or kind.most}
-    found = {"type": "array", "items": scalar, **{key: bound for key, bound in bounds.items() if bound}}
-    return {"anyOf": [found, {"type": "null"}]} if kind.optional else found
+    result = {"type": "array", "items": scalar, **{key: bound for key, bound in bounds.items() if bound}}
+    return {"anyOf": [result, {"type": "null"}]} if kind.optional else result
 
 
 def _text(spec: FieldSpec) -> str:

@@ -18,10 +18,10 @@ class Output(NamedTuple):
 @cache
 def outputs_of(cls: type[Component]) -> dict[str, Output]:
     """The outputs of a class by name."""
-    found: dict[str, Output] = {}
+    result: dict[str, Output] = {}
     for base in cls.__mro__:
         own = base.__dict__.get("facts")
         for word in own.outputs.split() if own is not None else ():
             name, _, kind = word.partition(":")
-            found[name.removesuffix("[]")] = Output(kind or "double", name.endswith("[]"))
-    return found
+            result[name.removesuffix("[]")] = Output(kind or "double", name.endswith("[]"))
+    return result

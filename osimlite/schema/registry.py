@@ -218,8 +218,8 @@ def class_for(tag: str) -> type[Object] | None:
     module = MODULES.get(_TAGS.get(tag, tag))
     if module is None:
         return None
-    found = getattr(import_module(module), _TAGS.get(tag, tag))
-    return None if found.abstract or found.tag != tag else found
+    result = getattr(import_module(module), _TAGS.get(tag, tag))
+    return None if result.abstract or result.tag != tag else result
 
 
 @by_tags

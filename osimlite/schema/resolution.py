@@ -111,19 +111,19 @@ def _bare(members: Callable[[Tree, Component, str], dict[str, Component]]) -> Ca
     def rule(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
         if not text:
             return Resolution(None, "empty")
-        found = members(tree, owner, target).get(text)
-        if found is None:
+        result = members(tree, owner, target).get(text)
+        if result is None:
             other = next(iter(tree.by_name.get(text, ())), None)
             return Resolution(None, "missing" if other is None else "wrong-type", other)
-        return Resolution(found)
+        return Resolution(result)
 
     return rule
 
 
 def _variable(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
     """The name of a state, a control or a generalized force."""
-    found = variables(tree, target).get(text)
-    return Resolution(found, None if found is not None else "missing" if text else "empty")
+    result = variables(tree, target).get(text)
+    return Resolution(result, None if result is not None else "missing" if text else "empty")
 
 
 def _pattern(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
@@ -132,8 +132,8 @@ def _pattern(tree: Tree, text: str, owner: Component, target: str) -> Resolution
         pattern = re.compile(text)
     except re.error:
         return Resolution(None, "illegal")
-    found = next((item for name, item in variables(tree, target).items() if pattern.fullmatch(name)), None)
-    return Resolution(found, None if found is not None else "missing")
+    result = next((item for name, item in variables(tree, target).items() if pattern.fullmatch(name)), None)
+    return Resolution(result, None if result is not None else "missing")
 
 
 def nothing_to_resolve(tree: Tree, text: str, owner: Component, target: str) -> Resolution:

@@ -28,13 +28,13 @@ def motions_of(joint: Joint) -> dict[str, MotionType]:
     names = [coordinate.name for coordinate in joint.coordinates]
     if joint.motion_types is not None:
         return dict(zip(names, joint.motion_types, strict=False))
-    found: dict[str, MotionType] = dict.fromkeys(names, "coupled")
+    result: dict[str, MotionType] = dict.fromkeys(names, "coupled")
     transform: Any = getattr(joint, "spatial_transform", None)
     for number in range(6) if transform is not None else ():
         axis = getattr(transform, f"rotation{number + 1}" if number < 3 else f"translation{number - 2}")
         if type(axis.function).__name__ == "LinearFunction" and abs(axis.function.coefficients[0]) == 1.0:
-            found |= dict.fromkeys(map(str, axis.coordinates), "rotational" if number < 3 else "translational")
-    return found
+            result |= dict.fromkeys(map(str, axis.coordinates), "rotational" if number < 3 else "translational")
+    return result
 
 
 def variables(tree: Tree, kind: str) -> dict[str, Component]:

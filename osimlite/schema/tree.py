@@ -169,12 +169,12 @@ class Tree:
 
     def at(self, path: str) -> Component:
         """The component at `path`, absolute or from the model; ModelError with the nearest path if none is there."""
-        found = self.by_path.get(normalised(path if path.startswith("/") else "/" + path) or "")
-        if found is None:
+        result = self.by_path.get(normalised(path if path.startswith("/") else "/" + path) or "")
+        if result is None:
             named = [known for known in self.by_path if last_name(known) == last_name(f"/{path}")]
             better = f"; did you mean '{named[0]}'?" if named else did_you_mean(path, self.by_path)
             raise ModelError(f"no component at '{path}'{better}")
-        return found
+        return result
 
     def uses(self) -> Iterator[Use]:
         """Yield every reference of the model that has a text or a component or must have one, in tree order."""
@@ -218,8 +218,8 @@ class Tree:
         """
         spec = field_specs(type(owner))[name]
         use = Use(owner, owner, spec, value)
-        found = self.resolve(use).target
-        if found is None:
+        result = self.resolve(use).target
+        if result is None:
             text = use.text
             if not text:
                 raise ModelError(
@@ -230,7 +230,7 @@ class Tree:
                 f"{type(owner).__name__} '{self.path_of(owner) or owner.name}': {name} names '{text}', "
                 f"but the model has no such {use.reference.target}{did_you_mean(text, self.spellings(use))}"
             )
-        return found
+        return result
 
     def text_for(self, owner: Component, reference: Reference, component: Component) -> str:
         """The text by which a property of `owner` names `component`, as OpenSim writes it."""
@@ -255,10 +255,10 @@ class Tree:
     @cached_property
     def by_name(self) -> dict[str, list[Component]]:
         """By the name at the end of its path, the first component of each class."""
-        found: dict[str, dict[type[Component], Component]] = {}
+        result: dict[str, dict[type[Component], Component]] = {}
         for component in self.components:
-            found.setdefault(last_name(self._paths[id(component)]), {}).setdefault(type(component), component)
-        return {name: list(components.values()) for name, components in found.items()}
+            result.setdefault(last_name(self._paths[id(component)]), {}).setdefault(type(component), component)
+        return {name: list(components.values()) for name, components in result.items()}
 
     def spellings(self, use: Use) -> list[str]:
         """Every text that would be right in this place, the shortest form of each component."""

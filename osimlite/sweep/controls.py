@@ -265,9 +265,9 @@ class VariedControls:
 
 def _by_actuator(controls: Mapping[int, Control], kind: str) -> dict[str, list[tuple[float, int]]]:
     """For each actuator that has parts of a kind, when or which they are, in order, and places of the variables."""
-    found: dict[str, list[tuple[float, int]]] = {}
+    result: dict[str, list[tuple[float, int]]] = {}
     for place, part in controls.items():
         if part.kind == kind:
             for actuator in part.actuators:
-                found.setdefault(actuator, []).append((part.at, place))
-    return {actuator: sorted(parts) for actuator, parts in found.items()}
+                result.setdefault(actuator, []).append((part.at, place))
+    return {actuator: sorted(parts) for actuator, parts in result.items()}

@@ -137,13 +137,13 @@ class Expression:
 def quantities(engine: Any) -> Mapping[str, Quantity]:
     """What can be looked at during the runs of a model, by name; of several with one name the first."""
     mechanism, count = engine.mechanism, len(engine.order)
-    found: dict[str, Quantity] = {"time": lambda engine, moments: np.array([t for t, _ in moments])}
+    result: dict[str, Quantity] = {"time": lambda engine, moments: np.array([t for t, _ in moments])}
     places = {place: number for number, place in enumerate(engine.order)}
     for place, info in enumerate(mechanism.coordinates):
         value = partial(_state, places[place]) if place in places else partial(_still, place)
         speed = partial(_state, count + places[place]) if place in places else partial(_still, None)
         for name in (info.name, info.path):
-            found |= {name: value, f"{name}/value": value, f"{name}/speed": speed}
+            result |= {name: value, f"{name}/value": value, f"{name}/speed": speed}
     more: list[tuple[str, Quantity]] = []
     for number, path in enumerate(engine.state.paths):
         state = partial(_state, 2 * count + number)
@@ -160,7 +160,7 @@ def quantities(engine: Any) -> Mapping[str, Quantity]:
             more += [(f"{name}_{letter}/speed", partial(_axis, motion, 3 + axis))]
     more += [(label, partial(_force, number)) for number, label in enumerate(engine.columns)]
     more += [(label, partial(_probe, number)) for number, label in enumerate(probe_labels(engine.probes))]
-    return dict(reversed(more)) | found
+    return dict(reversed(more)) | result
 
 
 def _state(place: int, engine: Any, moments: Moments) -> Floats:
@@ -172,11 +172,11 @@ def _still(place: int | None, engine: Any, moments: Moments) -> Floats:
 
 
 def _control(place: int, engine: Any, moments: Moments) -> Floats:
-    found = []
+    result = []
     for t, y in moments:
         engine.applied(t, y)
-        found.append(engine.controls()[place])
-    return np.array(found)
+        result.append(engine.controls()[place])
+    return np.array(result)
 
 
 def _force(place: int, engine: Any, moments: Moments) -> Floats:

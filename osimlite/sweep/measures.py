@@ -220,11 +220,11 @@ def energy(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     def gained(batch: Batch) -> Floats:
         runs = batch.runs
         ends = zip(runs.times.tolist(), batch.starts.tolist(), runs.states.tolist(), strict=True)
-        found = []
+        result = []
         for number, (t, start, end) in enumerate(ends):
             one = batch.engine_of(number)
-            found.append(sum(one.energies(t, end)) - sum(one.energies(0.0, start)))
-        return np.array(found)
+            result.append(sum(one.energies(t, end)) - sum(one.energies(0.0, start)))
+        return np.array(result)
 
     return Measure("energy", gained)
 
@@ -234,17 +234,17 @@ def _ends(place: int | None, locked: float, batch: Batch) -> Floats:
 
 
 def _expressed(expression: Expression, batch: Batch) -> list[float]:
-    found = []
+    result = []
     runs, times = batch.runs, batch.report_times
     for k, (end, state) in enumerate(zip(runs.times.tolist(), runs.states.tolist(), strict=True)):
         kept = int(np.searchsorted(times, end))
         moments = [*zip(times[:kept].tolist(), runs.reports[k, :kept].tolist(), strict=True), (end, state)]
-        found.append(expression.of(batch.engine_of(k), moments))
-    return found
+        result.append(expression.of(batch.engine_of(k), moments))
+    return result
 
 
 def _each(function: Callable[[Run], float], batch: Batch) -> list[float]:
-    found = []
+    result = []
     names, contacts = batch.names, batch.engine.contacts
     for k in range(len(batch.starts)):
         engine = batch.engine_of(k)
@@ -262,8 +262,8 @@ def _each(function: Callable[[Run], float], batch: Batch) -> list[float]:
             batch.quantities,
         )
         # What a function forgets to return would become no number, silently.
-        found.append(float(function(run)))
-    return found
+        result.append(float(function(run)))
+    return result
 
 
 def _state_place(engine: Any, name: str) -> tuple[int | None, float]:
@@ -282,7 +282,7 @@ def _state_place(engine: Any, name: str) -> tuple[int | None, float]:
 def _function(name: str) -> Callable[[Run], float]:
     place, _, function = name.rpartition(":")
     module = module_of_file(Path(place)) if place.endswith(".py") else module_named(place)
-    found = getattr(module, function, None)
-    if not callable(found):
+    result = getattr(module, function, None)
+    if not callable(result):
         raise SettingError(f"'{place}' has no function '{function}'{did_you_mean(function, vars(module))}")
-    return found
+    return result

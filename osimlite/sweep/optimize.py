@@ -132,7 +132,7 @@ def optimize(
     """
     look = method_named(method)
     refuse_counts(plan.variables)
-    free = [place for place, item in enumerate(plan.variables) if not item.is_fixed]
+    free = [index for index, item in enumerate(plan.variables) if not item.is_fixed]
     if not free:
         raise SettingError("there is nothing to search: every variable has one value only")
     if budget < 1 or (popsize is not None and popsize < 2):
@@ -183,7 +183,7 @@ def _start(
                 f"the start has one number for each of the {len(plan.variables)} variables, not {len(start)}"
             )
         start = dict(zip((item.name for item in plan.variables), start or (), strict=False))
-    found, present = [], variants.present()
+    result, present = [], variants.present()
     for place in free:
         item = plan.variables[place]
         value = start.get(item.name, present[place])
@@ -192,8 +192,8 @@ def _start(
             raise SettingError(f"'{item.name}' cannot start at {value}, outside {item.low:g} to {item.high:g}")
         if value is not None and item.is_log and value <= 0.0:
             within = False
-        found.append(item.fraction(value) if value is not None and within else 0.5)
-    return np.array(found)
+        result.append(item.fraction(value) if value is not None and within else 0.5)
+    return np.array(result)
 
 
 def found_by(folder: str | Path) -> dict[str, float]:
@@ -263,9 +263,9 @@ class _Evaluations:
         """Take what was found before."""
         columns = batch.to_pydict()
         values = [columns[item.name] for item in self.plan.variables]
-        found = zip(zip(*values, strict=True), columns["status"], columns[self.objective], strict=True)
+        result = zip(zip(*values, strict=True), columns["status"], columns[self.objective], strict=True)
         self._note(columns["status"], columns["reason"])
-        self._history += [(list(row), status, value) for row, status, value in found]
+        self._history += [(list(row), status, value) for row, status, value in result]
         # What is there is not forgotten, even if fewer runs are asked for now.
         self.budget = max(self.budget, len(self._history))
 
@@ -339,7 +339,7 @@ def _finish(
     write(variants.model, where / BEST)
     value = evaluations.sign * cost
     named = {item.name: x for item, x in zip(plan.variables, row, strict=True)}
-    found = Optimum(value, named, evaluations.count, number, ended, where / BEST, where / HISTORY)
+    result = Optimum(value, named, evaluations.count, number, ended, where / BEST, where / HISTORY)
     summary = {
         "objective": wanted["objective"],
         "value": value,
@@ -350,4 +350,4 @@ def _finish(
         "settings": wanted,
     }
     write_atomically(where / SUMMARY, json.dumps(summary, indent=2) + "\n")
-    return found
+    return result

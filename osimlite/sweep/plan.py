@@ -128,17 +128,17 @@ class Plan:
         Raises:
             SettingError: two of them have one name.
         """
-        found = dict.fromkeys(first, "int64")
+        result = dict.fromkeys(first, "int64")
         rest = [(item.name, "float64") for item in self.variables]
         rest += [("status", "string"), ("reason", "string"), ("time", "float64")]
         rest += [(measure_name(spec), "float64") for spec in dict.fromkeys(self.measures)]
         for name, kind in rest:
-            if name in found:
+            if name in result:
                 raise SettingError(
                     f"the results would have two columns '{name}'; call a coordinate by its path, a function otherwise"
                 )
-            found[name] = kind
-        return found
+            result[name] = kind
+        return result
 
     def settings(self) -> dict[str, Any]:
         """All that the results depend on."""
@@ -196,12 +196,12 @@ def plan(
         source = partial(_driven, maker, controls)
     model = source if isinstance(source, Model) else source({})
     mechanism = build_mechanism(model)
-    found = variables(vary, model, mechanism, parameters)
-    for item in found:
+    result = variables(vary, model, mechanism, parameters)
+    for item in result:
         tell_doubt(item.doubt)
-    needs_maker = any(isinstance(item.target, Parameter) for item in found)
+    needs_maker = any(isinstance(item.target, Parameter) for item in result)
     make = source if needs_maker and not isinstance(source, Model) else None
-    made = Plan(to_text(model), found, make=make)
+    made = Plan(to_text(model), result, make=make)
     if not any(info.motion_type == "translational" and not info.locked for info in mechanism.coordinates):
         # Only who asks for the distance by name is told that the model has none.
         made = replace(made, measures=tuple(name for name in made.measures if name != "distance"))
@@ -212,7 +212,7 @@ def plan(
     if made.accuracy >= 1.0:
         raise SettingError(f"'accuracy' is less than 1, not {made.accuracy:g}")
     check_integrator(made.integrator)
-    targets = {place: item.target for place, item in enumerate(found)}
+    targets = {place: item.target for place, item in enumerate(result)}
     nodes = {place: target for place, target in targets.items() if isinstance(target, Control)}
     check_nodes(nodes, made.interpolation, made.to)
     named = (*_stops(mechanism, below, True), *_stops(mechanism, above, False))

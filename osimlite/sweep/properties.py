@@ -84,8 +84,8 @@ class Setter:
 
     def get(self) -> float:
         """The number that is there."""
-        found = getattr(self.holder, self.name)
-        return float(found if self.entry is None else found[self.entry])
+        result = getattr(self.holder, self.name)
+        return float(result if self.entry is None else result[self.entry])
 
 
 def named(pattern: str, components: Iterable[N]) -> list[N]:
@@ -94,13 +94,13 @@ def named(pattern: str, components: Iterable[N]) -> list[N]:
     None if one of several means nothing.
     """
     known = list(components)
-    found: dict[int, N] = {}
+    result: dict[int, N] = {}
     for part in pattern.split(","):
         own = [item for item in known if _is_meant(part, item.path if part.startswith("/") else item.name)]
         if not own:
             return []
-        found |= {id(item): item for item in own}
-    return [item for item in known if id(item) in found]
+        result |= {id(item): item for item in own}
+    return [item for item in known if id(item) in result]
 
 
 def each(name: str, model: Model) -> list[str]:
@@ -116,7 +116,9 @@ def each(name: str, model: Model) -> list[str]:
     form = re.compile(f"{_regular(head)}({_regular(inner)}){_regular(end)}")
     components = model.components(Actuator if re.match("/control(@|$)", tail[len(end) :]) else Component)
     known = (item.path if head.startswith("/") else item.name for item in components)
-    return [f"{head}{text}{tail}" for text in dict.fromkeys(found[1] for found in map(form.fullmatch, known) if found)]
+    return [
+        f"{head}{text}{tail}" for text in dict.fromkeys(result[1] for result in map(form.fullmatch, known) if result)
+    ]
 
 
 def _regular(pattern: str) -> str:

@@ -59,9 +59,9 @@ def measure_named(name: str) -> Known | None:
 
 def start_named(name: str) -> Callable[[Any, Sequence[str] | None], Place]:
     """What makes the start of a name."""
-    found = _found(_STARTS, name)
-    assert found is not None
-    return found
+    result = _found(_STARTS, name)
+    assert result is not None
+    return result
 
 
 def measure_names() -> list[str]:

@@ -70,23 +70,23 @@ def settings_of(path: str | Path) -> dict[str, Any]:
 def _settings_in(table: Any) -> dict[str, Any]:
     """The settings in the schema of a table; ValueError (what is no Arrow is one too) if there are none."""
     try:
-        found = json.loads((table.metadata or {})[KEY])
+        result = json.loads((table.metadata or {})[KEY])
     except (KeyError, RecursionError):
-        found = None
-    if not isinstance(found, dict):
+        result = None
+    if not isinstance(result, dict):
         raise ValueError
-    return found
+    return result
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     """In what settings differ, in words."""
-    found = []
+    result = []
     for name in {**old, **new}:
         a, b = old.get(name), new.get(name)
         if a != b:
             is_brief = not isinstance(a, list | dict) and not isinstance(b, list | dict) and name != "model"
-            found.append(f"{name} ({a} before, {b} now)" if is_brief else name)
-    return found
+            result.append(f"{name} ({a} before, {b} now)" if is_brief else name)
+    return result
 
 
 def spare(path: Path, wanted: Mapping[str, Any]) -> None:
@@ -259,15 +259,15 @@ class Partial:
         pa = _arrow()
         first = next(_records(self.partial), None)
         try:
-            found = pa.ipc.read_schema(pa.py_buffer(b"" if first is None else first[0]))
-            before = _settings_in(found)
+            result = pa.ipc.read_schema(pa.py_buffer(b"" if first is None else first[0]))
+            before = _settings_in(result)
         except (ValueError, OSError):
             raise SettingError(
                 f"'{self.partial}' is no interrupted sweep, or is damaged at its beginning; remove it, or take another "
                 "name"
             ) from None
         unlike = differences(before, json.loads(self.schema.metadata[KEY]))
-        if unlike or not found.equals(self.schema):
+        if unlike or not result.equals(self.schema):
             raise SettingError(
                 f"the interrupted work in '{self.partial}' has other settings: {listed(unlike) or 'its columns'}; "
                 "ask for the same as before, or remove that file"
@@ -388,7 +388,7 @@ class Range(NamedTuple):
 def ranges(path: str | Path, names: Sequence[str]) -> dict[str, Range]:
     """Ranges of columns of results; those without any number are left out."""
     pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
-    found: dict[str, Range] = {}
+    result: dict[str, Range] = {}
     counts = dict.fromkeys(names, 0)
     with (
         damage_told(path),
@@ -407,10 +407,10 @@ def ranges(path: str | Path, names: Sequence[str]) -> dict[str, Range]:
                 new = Range(
                     float(column[low]), int(numbers[low]), float(column[high]), int(numbers[high]), float(column.mean())
                 )
-                old, before = found.get(name, new), counts[name]
+                old, before = result.get(name, new), counts[name]
                 counts[name] = before + len(column)
                 lower = min((old, new), key=lambda item: item.least)
                 upper = max((old, new), key=lambda item: item.most)
                 mean = (old.mean * before + new.mean * len(column)) / counts[name]
-                found[name] = Range(lower.least, lower.run_of_least, upper.most, upper.run_of_most, mean)
-    return found
+                result[name] = Range(lower.least, lower.run_of_least, upper.most, upper.run_of_most, mean)
+    return result

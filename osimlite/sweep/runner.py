@@ -119,14 +119,14 @@ class Runner:
             {measure_name(spec): np.full(count, np.nan) for spec in self.plan.measures},
         )
         groups: dict[bytes, list[_Sample]] = {}
-        for place, row in enumerate(values.tolist()):
+        for index, row in enumerate(values.tolist()):
             try:
                 variant = self.variants.variant(row)
                 start = self.variants.start(variant, row)
             except OsimliteError as error:
-                block.reasons[place] = str(error)
+                block.reasons[index] = str(error)
             else:
-                groups.setdefault(variant.structure, []).append(_Sample(place, variant, start))
+                groups.setdefault(variant.structure, []).append(_Sample(index, variant, start))
         for group in groups.values():
             try:
                 self._run(group, values, block)
@@ -135,7 +135,7 @@ class Runner:
                 for sample in group:
                     block.status[sample.place], block.reasons[sample.place] = FAILED, str(error)
         # A measure may have failed after others had been taken.
-        failed = [place for place in range(count) if block.status[place] == FAILED]
+        failed = [index for index in range(count) if block.status[index] == FAILED]
         for column in block.measures.values():
             column[failed] = np.nan
         return replace(block, seconds=time.perf_counter() - started)
@@ -171,12 +171,12 @@ class Runner:
             self._measure(made, batch, rows, block)
 
     def _look(self, structure: bytes, engine: Any) -> _Look:
-        found = self._looks.get(structure)
-        if found is None:
+        result = self._looks.get(structure)
+        if result is None:
             if len(self._looks) >= MOST_KEPT:
                 self._looks = {}
-            found = self._looks[structure] = _Look(self.plan, engine)
-        return found
+            result = self._looks[structure] = _Look(self.plan, engine)
+        return result
 
     def _measure(self, made: Measure, batch: Batch, rows: Any, block: Block) -> None:
         """Fill in a measure of some runs; a function of a user may raise anything, which is told of."""

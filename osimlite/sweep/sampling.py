@@ -50,10 +50,10 @@ class Samples:
         """Rows from `first` on, as many as `count` and as there are (k, d), in the units of the variables."""
         last = min(first + count, self.count)
         fractions = np.zeros((max(last - first, 0), len(self.variables)))
-        varied = [place for place, item in enumerate(self.variables) if not item.is_fixed]
+        varied = [index for index, item in enumerate(self.variables) if not item.is_fixed]
         if len(fractions) and varied:
             fractions[:, varied] = self._fractions(first, last, varied)
-        columns = [item.at(fractions[:, place]) for place, item in enumerate(self.variables)]
+        columns = [item.at(fractions[:, index]) for index, item in enumerate(self.variables)]
         return np.stack(columns, axis=1) if columns else fractions
 
     def _fractions(self, first: int, last: int, varied: Sequence[int]) -> Floats:
@@ -141,9 +141,9 @@ class Sobol:
         first = max(first, 1) if len(head) else first
         if first > self._next:
             self._points.fast_forward(first - self._next)
-        found: Floats = np.concatenate((head, self._points.random(last - first)))
+        result: Floats = np.concatenate((head, self._points.random(last - first)))
         self._next = last
-        return found
+        return result
 
 
 def _uniform(seed: int, first: int, last: int, width: int) -> Floats:
@@ -164,15 +164,15 @@ def _shuffled(first: int, last: int, count: int, seed: int, column: int) -> Floa
     half = max(1, -(-(count - 1).bit_length() // 2))
     mask = np.uint64((1 << half) - 1)
     keys = np.random.default_rng((seed, column)).integers(0, 2**64, 6, dtype=np.uint64)
-    found: Counts = np.arange(first, last, dtype=np.uint64)
-    beyond = np.ones(len(found), dtype=bool)
+    result: Counts = np.arange(first, last, dtype=np.uint64)
+    beyond = np.ones(len(result), dtype=bool)
     while beyond.any():
-        left, right = found[beyond] >> np.uint64(half), found[beyond] & mask
+        left, right = result[beyond] >> np.uint64(half), result[beyond] & mask
         for key in keys:
             left, right = right, left ^ (_mixed(right + key) & mask)
-        found[beyond] = (left << np.uint64(half)) | right
-        beyond = found >= count
-    return found.astype(np.float64)
+        result[beyond] = (left << np.uint64(half)) | right
+        beyond = result >= count
+    return result.astype(np.float64)
 
 
 def _mixed(x: Counts) -> Counts:

@@ -99,7 +99,7 @@ def differential_evolution(ask: Ask, search: Search) -> str:
     rng, size = np.random.default_rng(search.seed), len(search.start)
     first = rng.random((max(5, search.popsize or 10 * size), size))
     first[0] = search.start
-    found = optimize.differential_evolution(
+    result = optimize.differential_evolution(
         lambda points: ask(np.atleast_2d(points.T)),
         [(0.0, 1.0)] * size,
         init=first,
@@ -111,7 +111,7 @@ def differential_evolution(ask: Ask, search: Search) -> str:
         polish=False,
         rng=rng,
     )
-    return f"converged: {found.message}"
+    return f"converged: {result.message}"
 
 
 def nelder_mead(ask: Ask, search: Search) -> str:
@@ -121,14 +121,14 @@ def nelder_mead(ask: Ask, search: Search) -> str:
     simplex = np.tile(search.start, (size + 1, 1))
     for k in range(size):
         simplex[k + 1, k] += search.sigma if simplex[k + 1, k] + search.sigma <= 1.0 else -search.sigma
-    found = optimize.minimize(
+    result = optimize.minimize(
         lambda point: float(ask(point[None])[0]),
         search.start,
         method="Nelder-Mead",
         bounds=[(0.0, 1.0)] * size if search.is_bounded else None,
         options={"initial_simplex": simplex, "maxfev": 10**9, "maxiter": 10**9, "xatol": tolerance, "fatol": tolerance},
     )
-    return f"converged: {found.message}"
+    return f"converged: {result.message}"
 
 
 METHODS: dict[str, Callable[[Ask, Search], str]] = {

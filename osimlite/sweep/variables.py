@@ -111,8 +111,8 @@ class Variable:
 
     def at(self, fraction: Floats) -> Floats:
         """The values at fractions of the way from low to high, none of which is beyond them; exact at either end."""
-        found = np.clip(self.beyond(fraction), self.low, self.high)
-        return np.where(fraction <= 0.0, self.low, np.where(fraction >= 1.0, self.high, found))
+        result = np.clip(self.beyond(fraction), self.low, self.high)
+        return np.where(fraction <= 0.0, self.low, np.where(fraction >= 1.0, self.high, result))
 
     def beyond(self, fraction: Floats) -> Floats:
         """The values at fractions of the way from low to high, or farther."""
@@ -146,15 +146,15 @@ def parse(words: Sequence[str]) -> dict[str, Range]:
     Raises:
         SettingError: a word is not of that form, or a name comes twice.
     """
-    found: dict[str, Range] = {}
+    result: dict[str, Range] = {}
     for word in words:
         name, equals, text = (part.strip() for part in word.partition("="))
         if not (name and equals and text):
             raise SettingError(f"--vary takes NAME=LOW:HIGH or NAME=LOW:HIGH:COUNT, got '{word}'")
-        if name in found:
+        if name in result:
             raise SettingError(f"'{name}' is varied twice; give it once")
-        found[name] = text
-    return found
+        result[name] = text
+    return result
 
 
 def variables(
@@ -174,7 +174,7 @@ def variables(
     Raises:
         SettingError: a name means nothing (the nearest is told), a range is none, or a unit does not fit.
     """
-    found: list[Variable] = []
+    result: list[Variable] = []
     for names, given in ranges.items():
         known = [
             (name, _target(name, model, mechanism, parameters))
@@ -186,16 +186,16 @@ def variables(
                 made = _variable(name, *meaning, given)
                 if isinstance(made.target, Start) and not made.target.is_speed:
                     made = replace(made, doubt=_doubt(made, given, mechanism))
-                found.append(made)
+                result.append(made)
         if all(meaning is None for _, meaning in known):
             raise _unknown(names, model, mechanism, parameters)
     taken: dict[object, str] = {}
-    for item in found:
+    for item in result:
         for part in getattr(item.target, "parts", (item.target,)):
             if part in taken:
                 raise SettingError(f"'{taken[part]}' and '{item.name}' are the same number; vary one of them")
             taken[part] = item.name
-    return tuple(found)
+    return tuple(result)
 
 
 def refuse_counts(found: Sequence[Variable]) -> None:
@@ -226,11 +226,11 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
     if last == "control" and (driven := named(front, model.components(Actuator))):
         made = control(name, [item.path for item in driven], word)
         return made, made.unit
-    if word in ("", SCALE) and (found := places(model, route)):
-        unit = found[0].unit
-        if unit.startswith("rad | m") and (own := named(found[0].component, mechanism.coordinates)):
+    if word in ("", SCALE) and (result := places(model, route)):
+        unit = result[0].unit
+        if unit.startswith("rad | m") and (own := named(result[0].component, mechanism.coordinates)):
             unit = own[0].unit or "rad | m"
-        return Property(found, bool(word)), "" if word else unit
+        return Property(result, bool(word)), "" if word else unit
     if name == "slope":
         return Slope(), "rad"
     return None

@@ -104,18 +104,18 @@ class Variants:
         if not self._changes:
             return self.given
         key = tuple(values[place] for place in self._changes)
-        found = self._kept.get(key)
-        if found is None:
+        result = self._kept.get(key)
+        if result is None:
             try:
-                found = self._make(values)
+                result = self._make(values)
             except OsimliteError as error:
-                found = error
+                result = error
             if len(self._kept) >= MOST_KEPT:
                 self._kept = {}
-            self._kept[key] = found
-        if isinstance(found, OsimliteError):
-            raise found
-        return found
+            self._kept[key] = result
+        if isinstance(result, OsimliteError):
+            raise result
+        return result
 
     def start(self, variant: Variant, values: Sequence[float]) -> Floats:
         """Initial state of a sample (y,).
@@ -157,11 +157,11 @@ class Variants:
         if self._plan.equilibrate:
             for row, variant in zip(rows, variants, strict=True):
                 # An engine of its own is only made where it must be, and to tell why there is no equilibrium.
-                y, found = row.tolist(), None
+                y, result = row.tolist(), None
                 if len(variant.numbers):
                     with suppress(SimulationError):
-                        found = engine.equilibrated(0.0, y, variant.numbers)
-                row[:] = variant.engine.equilibrated(0.0, y) if found is None else found
+                        result = engine.equilibrated(0.0, y, variant.numbers)
+                row[:] = variant.engine.equilibrated(0.0, y) if result is None else result
         return rows
 
     def placed(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> Floats:
@@ -183,20 +183,20 @@ class Variants:
 
     def present(self) -> list[float | None]:
         """The values of the variables in the model as it is given; None where nothing tells it."""
-        found: list[float | None] = []
+        result: list[float | None] = []
         engine = self.given.engine
         setters = dict(self._setters)
-        for place, item in enumerate(self._plan.variables):
+        for index, item in enumerate(self._plan.variables):
             if isinstance(item.target, Start):
                 info = engine.mechanism.coordinates[engine.mechanism.coordinate_index(item.target.coordinates[0])]
-                found.append(info.default_speed if item.target.is_speed else info.default_value)
+                result.append(info.default_speed if item.target.is_speed else info.default_value)
             elif isinstance(item.target, Property):
-                found.append(1.0 if item.target.is_scaled else setters[place][0].get())
+                result.append(1.0 if item.target.is_scaled else setters[index][0].get())
             elif isinstance(item.target, Control):
-                found.append(item.target.present)
+                result.append(item.target.present)
             else:
-                found.append(item.target.default if isinstance(item.target, Parameter) else 0.0)
-        return found
+                result.append(item.target.default if isinstance(item.target, Parameter) else 0.0)
+        return result
 
     def set_start(self, values: Sequence[float]) -> None:
         """Make the initial state of a sample the default state of `model`."""

@@ -63,14 +63,14 @@ class Trial(NamedTuple):
     @property
     def evidence(self) -> Evidence | None:
         """That with markers first."""
-        found = [outcome.evidence for outcome in self.outcomes if outcome.evidence is not None]
-        return min(found, key=lambda item: item.measured is None, default=None)
+        result = [outcome.evidence for outcome in self.outcomes if outcome.evidence is not None]
+        return min(result, key=lambda item: item.measured is None, default=None)
 
     @property
     def steps(self) -> dict[str, Steps]:
         """By the loads of any of its setups."""
-        found = (quietly_steps(outcome.evidence) for outcome in self.outcomes if outcome.evidence is not None)
-        return next((steps for steps in found if steps), {})
+        result = (quietly_steps(outcome.evidence) for outcome in self.outcomes if outcome.evidence is not None)
+        return next((steps for steps in result if steps), {})
 
 
 class _Line(NamedTuple):
@@ -159,9 +159,9 @@ def _angles(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
     for number, trial in enumerate(trials):
         evidence = trial.evidence
         assert evidence is not None
-        for place, name in enumerate(evidence.coordinates):
-            column = evidence.values[:, place]
-            if not evidence.turning[place] or np.ptp(column) < STILL:
+        for index, name in enumerate(evidence.coordinates):
+            column = evidence.values[:, index]
+            if not evidence.turning[index] or np.ptp(column) < STILL:
                 continue
             stem, side = side_of(name)
             panels.setdefault(f"{stem} (deg)", []).append(
