@@ -239,7 +239,7 @@ def tool_setting(setup: Setup, found: FindingSink) -> None:
                         "solve_for_equilibrium_for_auxiliary_states is false",
                         tool, tag="solve_for_equilibrium_for_auxiliary_states", fault="fibers-not-in-equilibrium",
                     )  # fmt: skip
-        if is_a(analysis, "MuscleAnalysis") and not analysis.moment_arm_coordinate_list:
+        if is_a(analysis, "MuscleAnalysis") and analysis.compute_moments and not analysis.moment_arm_coordinate_list:
             found(
                 "no coordinate for moment arms: OpenSim fails",
                 analysis, tag="moment_arm_coordinate_list", fault="no-moment-arm-coordinate",
