@@ -57,14 +57,14 @@ def run(
     from osimlite.errors import SettingError
     from osimlite.files import expect_folder_of
     from osimlite.tools.many import found, run_many
-    from osimlite.tools.named_files import is_input
+    from osimlite.tools.named_files import inputs_among
 
     files = found(setups)
     if report is not None:
         if resume or cluster or workers not in (None, 1):
             raise SettingError("--report runs setups one after the other; leave out --workers, --cluster and --resume")
         expect_folder_of(report)
-        if any(is_input(report, setup) for setup in files):
+        if any(inputs_among([report], setup) for setup in files):
             raise SettingError(f"--report would replace '{report}', which the results come from; give it another name")
         workers = 1
     if len(files) == 1 and not as_json and not (resume or cluster):

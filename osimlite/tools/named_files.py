@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from osimlite.lint.config import Config
@@ -28,9 +28,9 @@ def named_files(setup: str, rule: str, passed: frozenset[str] = frozenset()) -> 
             yield from named_files(item.path, rule, passed | {setup})
 
 
-def is_input(path: Path, setup: Path) -> bool:
-    """Whether a file is a setup or one that it takes something from, by whatever name or link."""
-    if not os.path.isfile(path):
-        return False
-    inputs = (str(setup), *named_files(str(setup), "file"))
-    return any(os.path.isfile(name) and os.path.samefile(path, name) for name in inputs)
+def inputs_among(paths: Iterable[Path], setup: Path) -> list[Path]:
+    """Those of some files that are a setup or one that it takes something from, by whatever name or link."""
+    there = [path for path in paths if os.path.isfile(path)]
+    names = (str(setup), *named_files(str(setup), "file")) if there else ()
+    inputs = [name for name in dict.fromkeys(names) if os.path.isfile(name)]
+    return [path for path in there if any(os.path.samefile(path, name) for name in inputs)]

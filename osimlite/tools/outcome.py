@@ -16,7 +16,7 @@ from osimlite.records import dataclass, field, replace
 from osimlite.simulation.files.old_storage import PRECISION, printed
 from osimlite.simulation.files.storage import StoTable, adapter_lines
 from osimlite.tools.evidence import Evidence
-from osimlite.tools.named_files import is_input
+from osimlite.tools.named_files import inputs_among
 
 MOST_DIGITS = 1074
 """Behind the point of a number, of which the last is no zero."""
@@ -95,10 +95,10 @@ class Outcome:
 
     def _require_inputs_kept(self, setup: Path) -> None:
         """Refuse to write over what the results come from. A model may take the place of the one it was made of."""
-        for path in self._texts:
-            if (path.name in self.tables or path.suffix.lower() != ".osim") and is_input(path, setup):
-                told = f"a result would replace '{path}', which it is computed from; give it another name or place"
-                raise DocumentError(told, file=str(setup))
+        kept = [path for path in self._texts if path.name in self.tables or path.suffix.lower() != ".osim"]
+        for path in inputs_among(kept, setup):
+            told = f"a result would replace '{path}', which it is computed from; give it another name or place"
+            raise DocumentError(told, file=str(setup))
 
     def write(self, setup: Path) -> None:
         """Write what is still to be written, all files whole or none of them.
