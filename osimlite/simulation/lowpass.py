@@ -16,8 +16,6 @@ from osimlite.multibody.spatial import Array
 
 MOST_SAMPLES = 100_000
 """A record is not sampled more finely than this many times."""
-_BLOCK = 32
-"""So many values are filtered at once."""
 
 
 def lowpassed(times: Array, values: Array, cutoff: float, *, limited: bool = False) -> tuple[Array, Array]:
@@ -71,24 +69,12 @@ def _filtered(values: Array, cutoff: float) -> Array:
     w = math.tan(math.pi * cutoff)
     scale = (w + 1.0) * (w * w + w + 1.0)
     sums = [3 * w**3 + 2 * w * w - 2 * w - 3, 3 * w**3 - 2 * w * w - 2 * w + 3, (w - 1.0) * (w * w - w + 1.0)]
+    one, two, three = (total / scale for total in sums)
     taken = values[3:] + 3.0 * (values[2:-1] + values[1:-2]) + values[:-3]
-    return _followed(np.array(sums) / scale, values[:3], w**3 / scale * taken)
-
-
-def _followed(back: Array, start: Array, given: Array) -> Array:
-    """Values (3 + t, n), each what is given (t, n) less the three before it by three factors, the nearest first."""
-    found = np.concatenate([start, given])
-    size = min(_BLOCK, len(given))
-    # What one that is given does to those behind it, and what the three before a block do to those in it.
-    alone, before = np.zeros(size + 3), np.zeros((size + 3, 3))
-    alone[3:4], before[:3] = 1.0, np.eye(3)
-    for place in range(3, size + 3):
-        alone[place] -= back @ alone[place - 3 : place][::-1]
-        before[place] -= back @ before[place - 3 : place][::-1]
-    steps = np.subtract.outer(np.arange(size), np.arange(size))
-    among = np.where(steps < 0, 0.0, alone[3 + np.maximum(steps, 0)])
-    for first in range(3, len(found), max(size, 1)):
-        block = found[first : first + size]
-        count = len(block)
-        block[:] = among[:count, :count] @ block + before[3 : 3 + count] @ found[first - 3 : first]
+    found = np.concatenate([values[:3], w**3 / scale * taken])
+    # One after the other: the numbers of slow filters are so near one another that blocks of rows lose seven digits.
+    for row, (third, second, first) in zip(found[3:], zip(found, found[1:], found[2:], strict=False), strict=False):
+        row -= one * first
+        row -= two * second
+        row -= three * third
     return found
