@@ -132,6 +132,17 @@ def test_one_after_the_other_a_solution_and_none() -> None:
     assert x[2] == pytest.approx(solved(columns[[2]], wanted[[2]], low, high)[0][0], abs=1e-11)
 
 
+def test_entries_that_are_rounding_errors_are_none() -> None:
+    columns, wanted, low, high = problem(default_rng(12), 3, 8)
+    noise = 1e-15 * default_rng(13).normal(size=(1, 8, 1))
+    x, (missing,), (is_solved,) = solved(
+        np.concatenate([columns, noise], axis=2), np.hstack([wanted, [[5.0]]]), low, high
+    )
+    assert not is_solved
+    assert missing == pytest.approx([0.0, 0.0, 0.0, 5.0], abs=1e-9)
+    assert x == pytest.approx(solved(columns, wanted, low, high)[0], abs=1e-7)
+
+
 def test_python_does_the_same() -> None:
     columns, wanted, low, high = problem(default_rng(11), 3, 8)
     assert solved(columns, wanted, low, high, code=PYTHON)[0] == pytest.approx(

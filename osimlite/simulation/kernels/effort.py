@@ -27,6 +27,8 @@ POWER, BOUNDS = 0, 1
 TIGHTEST, CLOSEST, CLOSE = 1e-15, 1e-13, 1e-10
 """What may be missing of an equation, as part of its terms: nothing is looked for below the first, a search ends at the
 second, and with the third there is a solution."""
+ROUNDING, LEAST = 1e-12, 1e-14
+"""What part of the largest entry of a column is none, and of that of all: a force within the body moves no pelvis."""
 SLIGHT, SLOWEST = 1e-9, 0.9
 """How much of |λ - λ'|² is added, as part of the second derivative; what must be left at most of what was missing at
 the λ' before, to go on."""
@@ -83,6 +85,16 @@ def scale(sizes: Ints, columns: Floats, scales: Floats) -> None:
     """Make every equation as strong as the others, and note which entries there are."""
     m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
     wanted = at(columns, m * n)
+    most = 0.0
+    for j in range(m * n):
+        most = max(most, abs(columns[j]))
+    for j in range(n):
+        column, largest = at(columns, m * j), 0.0
+        for k in range(m):
+            largest = max(largest, abs(column[k]))
+        for k in range(m):
+            if abs(column[k]) <= max(ROUNDING * largest, LEAST * most):
+                column[k] = 0.0
     for k in range(m):
         square = 0.0
         for j in range(n):
