@@ -82,11 +82,11 @@ def stamped(path: str | Path) -> int | None:
     if unsaved and (held := unsaved.get(os.path.realpath(path))) is not None:
         return hash(held)
     try:
-        found = os.stat(path)
+        result = os.stat(path)
     except (OSError, ValueError):
         return None
     # Whoever puts another file in the place of one may keep the time of its last change.
-    return hash((found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino, found.st_dev))
+    return hash((result.st_mtime_ns, result.st_ctime_ns, result.st_size, result.st_ino, result.st_dev))
 
 
 def read_standard_input() -> bytes:

@@ -247,8 +247,8 @@ class Driver:
         known = np.append(moves.T @ (applied - self._weighed(data, wanted)), data.efc_aref[others] - rows @ wanted)
         held = rows @ moves
         matrix = np.block([[inertia, held.T], [held, np.zeros((len(others), len(others)))]])
-        found = np.linalg.lstsq(matrix, known)[0] if len(others) else np.linalg.solve(matrix, known)
-        accelerations = moves @ found[: len(self._free)] + wanted
+        result = np.linalg.lstsq(matrix, known)[0] if len(others) else np.linalg.solve(matrix, known)
+        accelerations = moves @ result[: len(self._free)] + wanted
         data.qfrc_passive += self._weighed(data, accelerations) - applied
         # What `_follow` writes is for the start of a step: within it there are no errors to take back.
         for place, item in zip(places, self._followed, strict=True):

@@ -31,8 +31,8 @@ def settings_table(folder: Path) -> tuple[Path, dict[str, Any]] | None:
 
 def largest_file(folder: Path) -> int:
     """The most bytes that are read of a file in a folder; OsimliteError if the settings make no sense."""
-    found = settings_table(folder)
-    return LARGEST_FILE if found is None else largest_file_in(*found)
+    result = settings_table(folder)
+    return LARGEST_FILE if result is None else largest_file_in(*result)
 
 
 def largest_file_in(file: Path, table: dict[str, Any]) -> int:

@@ -155,10 +155,10 @@ class _AsDataclass:
             defaults = {word: getattr(each, word) for word in ("default", "default_factory")}
             told |= {word: value for word, value in defaults.items() if value is not _NOTHING}
             made.append((name, Any, d.field(**told)))
-        found: dict[str, Any] = d.make_dataclass(cls.__name__, made).__dict__["__dataclass_fields__"]
+        result: dict[str, Any] = d.make_dataclass(cls.__name__, made).__dict__["__dataclass_fields__"]
         # The next one asks the class itself: to make them costs more than many a motion.
-        cls.__dataclass_fields__ = found
-        return found
+        cls.__dataclass_fields__ = result
+        return result
 
 
 def _shown(self: Any) -> str:

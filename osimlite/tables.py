@@ -88,11 +88,11 @@ class MarkerHeader:
     label_line = 4
 
     def __init__(self, data: bytes) -> None:
-        found = [match for match in islice(_LINE.finditer(data), 5) if match.end() > match.start()]
-        self.lines = [_text(data[match.start() : min(match.end(), match.start() + LONGEST_LINE)]) for match in found]
+        result = [match for match in islice(_LINE.finditer(data), 5) if match.end() > match.start()]
+        self.lines = [_text(data[match.start() : min(match.end(), match.start() + LONGEST_LINE)]) for match in result]
         # Where the line of X1 Y1 Z1 is missing the rows begin with the fifth.
-        self.row_line = 5 if self.lines[4:] and self.lines[4][:1].isdigit() else len(found) + 1
-        self.rows = found[4].start() if self.row_line == 5 and found[4:] else found[-1].end() if found else 0
+        self.row_line = 5 if self.lines[4:] and self.lines[4][:1].isdigit() else len(result) + 1
+        self.rows = result[4].start() if self.row_line == 5 and result[4:] else result[-1].end() if result else 0
         keys, values = self.words(2), self.words(3)
         # Of a value that is missing nobody knows to which key it belongs.
         pairs = zip(keys, values, strict=True) if len(keys) == len(values) else ()
@@ -135,9 +135,9 @@ class StorageHeader:
                 key, value = (_word(match, group, count) for group in (1, 2))
                 self.entries[COUNTS.get(key.text, key.text)] = Entry(key, value)
         start = mark + end.end() if end else mark + labels.start() if labels else len(data)
-        found = _SOLID.search(data, start)
-        self.label_line = number + bool(end) + (data.count(b"\n", start, found.start()) if found else 0)
-        start = data.rfind(b"\n", 0, found.start()) + 1 if found else len(data)
+        result = _SOLID.search(data, start)
+        self.label_line = number + bool(end) + (data.count(b"\n", start, result.start()) if result else 0)
+        start = data.rfind(b"\n", 0, result.start()) + 1 if result else len(data)
         self.rows = data.find(b"\n", start) + 1 or len(data)
         self.row_line = self.label_line + 1
         # The newer of OpenSim's readers takes a label up to a tab, the older up to a blank.

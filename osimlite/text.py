@@ -83,14 +83,14 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 60.0) -> str | N
         but_for_case = [choice for choice in choices if choice.lower() == exact.lower()]
         if but_for_case:
             return but_for_case[0]
-    found = process.extractOne(word, choices, scorer=fuzz.ratio, processor=str.lower, score_cutoff=cutoff)
-    return found[0] if found else None
+    result = process.extractOne(word, choices, scorer=fuzz.ratio, processor=str.lower, score_cutoff=cutoff)
+    return result[0] if result else None
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """``"; did you mean 'x'?"``, or an empty text if nothing is near."""
-    found = nearest(word, known)
-    return f"; did you mean '{found}'?" if found else ""
+    result = nearest(word, known)
+    return f"; did you mean '{result}'?" if result else ""
 
 
 def or_known(word: str, known: Iterable[str], *more: str) -> str:

@@ -43,13 +43,13 @@ class CorpusModel(NamedTuple):
 
 def corpus_models() -> list[CorpusModel]:
     """Every model of the shared corpus in the order of its id; empty where the folder is absent."""
-    found = []
+    result = []
     for path in sorted(SHARED.glob("corpus/models/*/*.osim")):
         name = path.parent.name
         converted = SHARED / "corpus" / "converted" / f"{name}.osim.gz"
         truth = SHARED / "corpus" / "truth" / f"{name}.json.gz"
-        found.append(CorpusModel(name, path, truth, converted if converted.exists() else None))
-    return found
+        result.append(CorpusModel(name, path, truth, converted if converted.exists() else None))
+    return result
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

@@ -76,8 +76,8 @@ def test_what_is_no_file_is_not_included(special: Path, tmp_path: Path) -> None:
 def test_what_is_no_file_is_not_included_in_an_editor(special: Path, tmp_path: Path) -> None:
     """The text may be that of a file that is not written yet."""
     source = Source.of_characters(INCLUDING.format(special), str(tmp_path / "new.osim"))
-    (found,) = (finding for finding in check_source(source) if finding.code == "OSIM702")
-    assert "which is not read: this is a " in found.message and found.message.endswith(": it stays empty")
+    (result,) = (finding for finding in check_source(source) if finding.code == "OSIM702")
+    assert "which is not read: this is a " in result.message and result.message.endswith(": it stays empty")
 
 
 @pytest.mark.parametrize("command", ["info", "format", "upgrade", "translate", "simulate"])
@@ -250,8 +250,8 @@ def test_a_file_keeps_its_owner_and_mode(tmp_path: Path, rewrite: Callable[..., 
     os.chown(place, 1234, 4321)
     place.chmod(0o600)
     assert rewrite(place).code == 0
-    found = place.stat()
-    assert (found.st_uid, found.st_gid, found.st_mode & 0o777) == (1234, 4321, 0o600)
+    result = place.stat()
+    assert (result.st_uid, result.st_gid, result.st_mode & 0o777) == (1234, 4321, 0o600)
     assert place.read_text() != MESSY
 
 

@@ -57,14 +57,14 @@ def test_accelerations_are_those_of_the_mechanism(make):
         q, u, _ = driver.state()
         u += 0.2 * k
         driver.set_state(q, u)
-        found = [driver.data.joint(driver.mjcf.leads[place].joint).qacc[0] for place in range(len(q))]
-        np.testing.assert_allclose(found, mechanism.acceleration(q, u), rtol=1e-9, atol=1e-9)
+        result = [driver.data.joint(driver.mjcf.leads[place].joint).qacc[0] for place in range(len(q))]
+        np.testing.assert_allclose(result, mechanism.acceleration(q, u), rtol=1e-9, atol=1e-9)
         driver.step(40)
         state = mechanism.at(driver.state()[0])
         mujoco.mj_kinematics(driver.model, driver.data)
         for index, body in enumerate(mechanism.bodies):
-            found = driver.data.body(body.name).xpos
-            np.testing.assert_allclose(found, state.transform(index)[:3, 3], rtol=0.0, atol=1e-12)
+            result = driver.data.body(body.name).xpos
+            np.testing.assert_allclose(result, state.transform(index)[:3, 3], rtol=0.0, atol=1e-12)
 
 
 def test_a_ball_joint_turns_by_its_angular_velocity():
@@ -122,9 +122,9 @@ def test_bodies_on_ellipsoids_and_under_constraints_accelerate_as_they_must(make
     mechanism = driver.mjcf.robot.mechanism
     q, u = mechanism.default_state()
     driver.set_state(q, u)
-    found = [driver.data.joint(driver.mjcf.leads[place].joint).qacc[0] for place in range(len(q))]
+    result = [driver.data.joint(driver.mjcf.leads[place].joint).qacc[0] for place in range(len(q))]
     wanted = mechanism.rate_matrix(q) @ mechanism.acceleration(q, u) + mechanism.rate_bias(q, u)
-    np.testing.assert_allclose(found, wanted, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(result, wanted, rtol=1e-8, atol=1e-8)
     driver.step(50)
     q, u, _ = driver.state()
     state = mechanism.at(q, u)
@@ -234,6 +234,6 @@ def test_real_models_accelerate_as_the_mechanism_does(corpus_model):
         assert [record.detail for record in driver.mjcf.fidelity if record.kind == "singular"] == [error.message]
         return
     for place, (joint, line) in driver.mjcf.leads.items():
-        found = driver.data.joint(joint).qacc[0] / line.slope
+        result = driver.data.joint(joint).qacc[0] / line.slope
         tolerance = NEARLY.get(corpus_model.id, 1e-8) * max(1.0, np.abs(wanted).max())
-        assert found == pytest.approx(wanted[place], rel=0.0, abs=tolerance), mechanism.coordinates[place].path
+        assert result == pytest.approx(wanted[place], rel=0.0, abs=tolerance), mechanism.coordinates[place].path

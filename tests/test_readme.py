@@ -23,9 +23,9 @@ def test_the_library_examples_run(repo: Path, tmp_path: Path, monkeypatch: pytes
     pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     monkeypatch.chdir(tmp_path)
     osimlite.write(dynamic_walker(), "walker.osim")
-    found = blocks((repo / "README.md").read_text(), "python")
-    assert found
-    for block in found:
+    result = blocks((repo / "README.md").read_text(), "python")
+    assert result
+    for block in result:
         exec(compile(block, "README.md", "exec"), {})
     assert (tmp_path / "states.sto").exists() and (tmp_path / "copy.osim").exists()
 

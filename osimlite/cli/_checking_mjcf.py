@@ -15,17 +15,17 @@ def check(file: Path, mjcf: Path, output: Path | None) -> None:
     from osimlite.files import make_folder, write_atomically
     from osimlite.translate.mjcf.check import check_mjcf
 
-    found = check_mjcf(read(file), mjcf)
-    plain_console().print(_table(found, mjcf.name))
-    if found.missing:
-        say(f"not in it: {listed(list(found.missing), most=6)}")
-    if found.coordinates:
-        say(f"no joint has the name of {listed(list(found.coordinates), most=6)}: it stands where it stands")
-    if found.bodies is not None:
-        say(f"origins of bodies are off by {1e3 * found.bodies.rms:.2g} mm (root mean square)")
+    result = check_mjcf(read(file), mjcf)
+    plain_console().print(_table(result, mjcf.name))
+    if result.missing:
+        say(f"not in it: {listed(list(result.missing), most=6)}")
+    if result.coordinates:
+        say(f"no joint has the name of {listed(list(result.coordinates), most=6)}: it stands where it stands")
+    if result.bodies is not None:
+        say(f"origins of bodies are off by {1e3 * result.bodies.rms:.2g} mm (root mean square)")
     if output is not None:
         make_folder(output)
-        write_atomically(output / "check.json", found.to_json())
+        write_atomically(output / "check.json", result.to_json())
         say(f"wrote {output / 'check.json'}")
 
 

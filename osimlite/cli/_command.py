@@ -57,13 +57,13 @@ class _Parameter(NamedTuple):
             names = (*names, f"--{self.name.replace('_', '-')}")
             if self.type is bool:
                 names = (*names[:-1], f"{names[-1]}/--no-{names[-1][2:]}")
-        found = {}
+        result = {}
         for name in names:
             yes, _, no = name.partition("/")
-            found[yes] = True
+            result[yes] = True
             if no:
-                found[no] = False
-        return found
+                result[no] = False
+        return result
 
     def scalar(self) -> tuple[Any, bool]:
         """The type of one value, and whether there may be several."""
@@ -101,12 +101,12 @@ class Command:
         """What the command takes, in the order of its help."""
         function: Any = self.function
         defaults = dict(zip(reversed([*_names(function)]), reversed(function.__defaults__ or ()), strict=False))
-        found = []
+        result = []
         for name in _names(function):
             annotation = eval(function.__annotations__[name], function.__globals__)
             kind, declared = annotation.__origin__, annotation.__metadata__[0]
-            found.append(_Parameter(name, kind, declared, defaults.get(name, ...)))
-        return found + [_Parameter(each.name, each.type, _declared(each), each.default) for each in self._more()]
+            result.append(_Parameter(name, kind, declared, defaults.get(name, ...)))
+        return result + [_Parameter(each.name, each.type, _declared(each), each.default) for each in self._more()]
 
     @property
     def __annotations__(self) -> dict[str, Any]:  # type: ignore[override]

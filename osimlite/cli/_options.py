@@ -119,15 +119,15 @@ def named_words(words: Iterable[str] | None, option: str, form: str = "NAME=VALU
     """
     from osimlite.errors import SettingError
 
-    found = {}
+    result = {}
     for word in words or ():
         name, equals, value = (part.strip() for part in word.partition("="))
         if not equals:
             raise SettingError(f"{option} takes {form}, got '{word}'")
-        if name in found:
+        if name in result:
             raise SettingError(f"{option} names '{name}' twice; leave one out")
-        found[name] = value
-    return found
+        result[name] = value
+    return result
 
 
 def named_numbers(words: Iterable[str] | None, option: str) -> dict[str, float]:
@@ -138,13 +138,13 @@ def named_numbers(words: Iterable[str] | None, option: str) -> dict[str, float]:
     """
     from osimlite.errors import SettingError
 
-    found = {}
+    result = {}
     for name, text in named_words(words, option, "NAME=NUMBER").items():
         try:
-            found[name] = float(text)
+            result[name] = float(text)
         except ValueError:
             raise SettingError(f"'{text}' is no number for '{name}'; write {name}=2.5") from None
-    return found
+    return result
 
 
 def quantities(
@@ -166,14 +166,14 @@ def quantities(
     from osimlite.simulation.start import in_units_of, suspect_value
     from osimlite.text import did_you_mean
 
-    found = {}
+    result = {}
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
     for name, text in named_words(words, option, form).items():
         try:
             if name in states:
-                found[name] = float(text)
+                result[name] = float(text)
                 continue
-            found[name] = in_units_of(mechanism, name, text)
+            result[name] = in_units_of(mechanism, name, text)
             # A speed has no range.
             info = mechanism.coordinates[mechanism.coordinate_index(name)]
             if option == "--set" and (odd := suspect_value(info, name, text)):
@@ -183,7 +183,7 @@ def quantities(
             raise OsimliteError(f"{option}: {error.message}{did_you_mean(name, states)}") from None
         except ValueError:
             raise SettingError(f"{option}: the state '{name}' takes a number, not '{text}'") from None
-    return found
+    return result
 
 
 def read_source(source: str, parameter: Iterable[str] | None) -> tuple[Model, Path | None]:

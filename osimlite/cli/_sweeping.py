@@ -133,8 +133,8 @@ def _levels(words: Sequence[str] | None, option: str) -> dict[str, str]:
     from osimlite.quantity import quantity
 
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
-    found = named_words(words, option, form)
-    for text in found.values():
+    result = named_words(words, option, form)
+    for text in result.values():
         if quantity(text) is None:
             raise SettingError(f"{option} takes {form}, got '{text}'")
-    return found
+    return result

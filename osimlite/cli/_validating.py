@@ -69,7 +69,7 @@ def run(
     failed = False
     if diff:
         shown = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
-        count, left, unread = (sum(counts[place] for counts in shown) for place in range(3))
+        count, left, unread = (sum(counts[index] for counts in shown) for index in range(3))
         say(f"Would mend {counted(count, 'place')}{_more(left)}.", err=True)
         return 2 if unread else int(count > 0)
     if fix or unsafe_fixes:

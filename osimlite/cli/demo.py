@@ -128,8 +128,8 @@ def _check(tour: _Tour) -> None:
         assert text.count(MISSPELT[0]) == 1
         broken = file.with_name("misspelt.osim")
         write_atomically(broken, text.replace(*MISSPELT))
-        found = validate(broken)
-        show(render(replace(found, findings=found.errors), "full"))
+        result = validate(broken)
+        show(render(replace(result, findings=result.errors), "full"))
         tell("OpenSim reads such a file, and refuses to simulate it", broken)
 
     with tour.step("Translate it to URDF, for robotics") as tell:
@@ -144,7 +144,7 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
     from osimlite.models.source import make_model
     from osimlite.simulation.run import Simulation
 
-    found = []
+    result = []
     with ExitStack() as work:
         with tour.step("Make three models ready to move") as tell:
             ready = [work.enter_context(Simulation(make_model(motion.model), "compiled")) for motion in MOTIONS]
@@ -156,18 +156,18 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
                 trajectory.write(folder)
                 write(simulation.model, folder / f"{simulation.model.name}.osim")
                 tell(motion.told(trajectory), folder)
-            found.append(trajectory)
+            result.append(trajectory)
     if not pictures:
         return []
     from osimlite.view import Shown, Story, plot_simulation
 
     with tour.step("Plot the jump: coordinates, activations, forces, energy") as tell:
-        plots = plot_simulation(found[-1], tour.folder / MOTIONS[-1].model)
+        plots = plot_simulation(result[-1], tour.folder / MOTIONS[-1].model)
         tell(f"{len(plots)} pictures", plots[0].with_name("*.png"))
     with tour.step("Write a page for the browser of each motion") as tell:
         pages = []
         titles = [(motion.title, f"{motion.model}.html") for motion in MOTIONS]
-        for motion, trajectory in zip(MOTIONS, found, strict=True):
+        for motion, trajectory in zip(MOTIONS, result, strict=True):
             assert trajectory.model is not None
             shown = Shown.of(trajectory.model, trajectory.mechanism, motion=trajectory)
             words = f"{motion.told(trajectory)} {motion.seen}"

@@ -117,17 +117,17 @@ def doctor(
     wanted = requirements()
     uses = purposes(wanted)
     every = {name for names in wanted.values() for name in names}
-    found = {}
+    result = {}
     with progress_bar("loading each package", len(every)) as progress, ThreadPoolExecutor(2 * cores()) as pool:
         # Each in a process of its own, side by side.
         for count, package in enumerate(pool.map(examine, every), 1):
-            found[package.name] = package
+            result[package.name] = package
             progress(count)
     table = plain_table()
     for heading in ("extra", "for", "packages"):
         table.add_column(heading, overflow="fold")
     for extra, names in wanted.items():
-        packages = [found[name] for name in names]
+        packages = [result[name] for name in names]
         missing = any(not package.version for package in packages)
         words = ", ".join(f"{item.name} {item.version or 'missing'}" for item in packages)
         add_row(table, extra or "(none)", ", ".join(uses[extra]), words)
@@ -139,7 +139,7 @@ def doctor(
     _show_places(model)
     say()
     say("shell completion: osimlite --install-completion")
-    broken = [package for package in found.values() if package.trouble]
+    broken = [package for package in result.values() if package.trouble]
     for package in broken:
         say(f"{package.name} {package.version} cannot be loaded: {package.trouble}")
     if broken:
@@ -160,12 +160,12 @@ def requirements() -> dict[str, list[str]]:
 
 def purposes(wanted: dict[str, list[str]]) -> dict[str, list[str]]:
     """What each extra is for: the uses all of whose packages it brings, and no extra before it does."""
-    found: dict[str, list[str]] = {extra: [] for extra in wanted}
+    result: dict[str, list[str]] = {extra: [] for extra in wanted}
     for use, packages in NEEDS.items():
         extra = next((extra for extra, names in wanted.items() if {*packages} <= {*names}), None)
         if extra is not None:
-            found[extra].append(use)
-    return found
+            result[extra].append(use)
+    return result
 
 
 def bringing(module: str | None) -> str | None:
@@ -195,11 +195,11 @@ def examine(name: str) -> Package:
 @cache
 def _modules(path: tuple[str, ...]) -> dict[str, list[str]]:
     """What can be imported of each package on a path, by the package's name in small letters."""
-    found: dict[str, list[str]] = {}
+    result: dict[str, list[str]] = {}
     for module, owners in sorted(metadata.packages_distributions().items()):
         for owner in owners:
-            found.setdefault(owner.lower(), []).append(module)
-    return found
+            result.setdefault(owner.lower(), []).append(module)
+    return result
 
 
 def _show_places(model: Path | None) -> None:

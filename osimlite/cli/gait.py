@@ -90,22 +90,22 @@ def gait(
         )
         engine: Any = simulation.engine
         basin_places(engine, basin_x, basin_y)
-        found, step_map = _walk(engine, state, foot, to, settle, accuracy)
-        found.skipped = simulation.forces.skipped
-        cycle = found.cycle
+        result, step_map = _walk(engine, state, foot, to, settle, accuracy)
+        result.skipped = simulation.forces.skipped
+        cycle = result.cycle
         if step_map is not None and cycle is not None:
             for part in perturb or ():
                 with progress_bar(f"starting within {part:.0%}", starts) as progress:
                     states = perturbed(step_map, state, part, starts, seed)
                     walks = walks_from(step_map, cycle, states, steps, progress=progress)
-                found.nearby.append(Nearby(part, sum(len(walk.steps) >= steps for walk in walks), starts, steps))
+                result.nearby.append(Nearby(part, sum(len(walk.steps) >= steps for walk in walks), starts, steps))
             if basin:
                 with progress_bar("basin", grid * grid) as progress:
-                    found.basin = find_basin(
+                    result.basin = find_basin(
                         step_map, cycle, basin_x, basin_y, reach=reach, grid=grid, wanted=steps, progress=progress
                     )
-        files = _write(where, found, pictures) if where else []
-    _told(found, files).show()
+        files = _write(where, result, pictures) if where else []
+    _told(result, files).show()
     if cycle is None:
         raise SystemExit(1)
 
@@ -170,14 +170,14 @@ def _walk(
     footing = find_footing(engine, feet)
     (walk,) = walk_many(engine, [state], to, footing=footing, accuracy=WALK_ACCURACY)
     names = [engine.mechanism.coordinate_names[place] for place in engine.order]
-    found = GaitReport(engine.mechanism.name, names, walk)
+    result = GaitReport(engine.mechanism.name, names, walk)
     step_map = None
     try:
         step_map = StepMap(engine, state, footing=footing, accuracy=accuracy)
-        found.cycle = find_cycle(step_map, settle=settle)
+        result.cycle = find_cycle(step_map, settle=settle)
     except OsimliteError as error:
-        found.why_not = error.message
-    return found, step_map
+        result.why_not = error.message
+    return result, step_map
 
 
 def _told(found: GaitReport, files: Sequence[Path]) -> Facts:

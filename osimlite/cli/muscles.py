@@ -78,7 +78,7 @@ def muscles(
     model = read(file)
     mechanism = build_mechanism(model)
     values = _swept(mechanism, coordinate or (), points or (15 if len(coordinate or ()) > 1 else 50))
-    found: dict[str, MuscleCurves] = {}
+    result: dict[str, MuscleCurves] = {}
     for path in (file, *((compare,) if compare is not None else ())):
         with progress_bar(f"muscles of {path.name}", None) as advance:
             curves = muscle_curves(
@@ -90,18 +90,18 @@ def muscles(
                 folder=path.parent,
                 progress=advance,
             )
-        found[str(path)] = curves if muscle else curves.of(curves.crossing)
-    first, *others = found.values()
+        result[str(path)] = curves if muscle else curves.of(curves.crossing)
+    first, *others = result.values()
     if not first.muscles:
         raise ModelError(
             f"'{file.name}' has no muscle" + (f" that moves with {listed(list(values))}" if values else "s")
         )
     if others:
         first, second = _common(first, others[0])
-        found = dict(zip(found, (first, second), strict=True))
-    _print(list(found.values()), file, compare)
+        result = dict(zip(result, (first, second), strict=True))
+    _print(list(result.values()), file, compare)
     if output is not None:
-        _write(found, output)
+        _write(result, output)
         say(f"wrote {output}")
     if plot:
         from osimlite.view.muscle_plots import plot_muscles
@@ -118,10 +118,10 @@ def _swept(mechanism: Mechanism, words: Sequence[str], points: int) -> dict[str,
     from osimlite.errors import ModelError, SettingError
     from osimlite.simulation.start import in_units_of, suspect_value
 
-    found = {}
+    result = {}
     for word in words:
         name, equals, given = (part.strip() for part in word.partition("="))
-        if name in found:
+        if name in result:
             raise SettingError(f"--coordinate names '{name}' twice; leave one out")
         try:
             info = mechanism.coordinates[mechanism.coordinate_index(name)]
@@ -140,8 +140,8 @@ def _swept(mechanism: Mechanism, words: Sequence[str], points: int) -> dict[str,
             raise SettingError(f"--coordinate takes the lower end of the range first, got '{word}'")
         if not (isfinite(low) and isfinite(high) and low < high):
             raise SettingError(f"coordinate '{name}' has no range to sweep; give one, such as {name}=-1:1")
-        found[name] = [low + (high - low) * k / (points - 1) for k in range(points)]
-    return found
+        result[name] = [low + (high - low) * k / (points - 1) for k in range(points)]
+    return result
 
 
 def _common(first: MuscleCurves, second: MuscleCurves) -> tuple[MuscleCurves, MuscleCurves]:

@@ -94,12 +94,12 @@ def optimize(
         feet=tuple(foot) if foot else None, **chosen,
     )  # fmt: skip
     with progress_bar("searching", budget) as progress:
-        found = search(
+        result = search(
             plan, Objective(objective, maximize), output, method=method, budget=budget, popsize=popsize, seed=seed,
             sigma=sigma, tolerance=tolerance, is_bounded=not unbounded, resume=resume, force=force,
             start=found_by(start) if start else None, workers=workers, cluster=cluster, progress=progress,
         )  # fmt: skip
-    _told(objective, found).show()
+    _told(objective, result).show()
 
 
 def _told(objective: str, found: Optimum) -> Facts:

@@ -31,8 +31,8 @@ def rule(
 
     rules = all_rules()
     columns = max(shutil.get_terminal_size().columns, 60) if sys.stdout.isatty() else 80
-    found = [known for known in rules if code is None or known.matches(code)]
-    if code is not None and not found:
+    result = [known for known in rules if code is None or known.matches(code)]
+    if code is not None and not result:
         names = [word for known in (*rules, *groups()) for word in (known.code, known.name)]
         near = did_you_mean(code, names) or "; 'osimlite rule' lists all rules"
         raise OsimliteError(f"there is no rule '{code}'{near}")
@@ -41,13 +41,13 @@ def rule(
     for group in groups():
         if code is not None and (code == group.name or code.upper() == group.code):
             show(_wrapped(group_page(group), columns) + "\n\n")
-    if len(found) > 1:
-        width = max(len(known.name) for known in found)
-        for known in found:
+    if len(result) > 1:
+        width = max(len(known.name) for known in result)
+        for known in result:
             head = f"{known.code}  {known.name:{width}}  {known.severity.value:7}  "
             show(textwrap.fill(known.summary, columns, initial_indent=head, subsequent_indent=" " * len(head)) + "\n")
         return
-    show(_wrapped(page_of(found[0]), columns) + "\n")
+    show(_wrapped(page_of(result[0]), columns) + "\n")
 
 
 def _wrapped(page: str, columns: int) -> str:

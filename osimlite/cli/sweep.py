@@ -100,11 +100,11 @@ def _told(plan: Plan, outcome: Outcome) -> Facts:
         facts.add("failed", f"{counted(count, 'run')}: {reason}")
     if others := outcome.status["failed"] - sum(count for _, count in told):
         facts.add("failed", f"{counted(others, 'run')} for other reasons; the column 'reason' has them all")
-    for name, found in ranges(outcome.path, [measure_name(spec) for spec in plan.measures]).items():
+    for name, result in ranges(outcome.path, [measure_name(spec) for spec in plan.measures]).items():
         facts.add(
             name,
-            f"{found.least:.6g} (run {found.run_of_least}) to {found.most:.6g} (run {found.run_of_most}), "
-            f"mean {found.mean:.6g}",
+            f"{result.least:.6g} (run {result.run_of_least}) to {result.most:.6g} (run {result.run_of_most}), "
+            f"mean {result.mean:.6g}",
         )
     facts.add("file", str(outcome.path))
     return facts

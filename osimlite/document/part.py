@@ -25,7 +25,7 @@ def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
     for note in document.notes:
         # Properties of older versions are still in many files; what is like one of today is misspelt.
         if note.kind == "unknown-tag" and note.owner and (near := nearest(note.word, field_specs(type(note.owner)))):
-            told = f"<{note.word}> means nothing in this document; did you mean <{near}>?"
-            raise document.source.fault(DocumentError, told, document.source.of_tag(note.number))
+            message = f"<{note.word}> means nothing in this document; did you mean <{near}>?"
+            raise document.source.fault(DocumentError, message, document.source.of_tag(note.number))
     assert isinstance(document.top, cls)
     return document.top

@@ -53,9 +53,9 @@ class ChosenFrames:
         for name, trial in trials.items():
             share = STANDING if name == STATIC and moving else len(trial.times) / max(moving, 1)
             rows = np.full((len(trial.times), len(self.markers), 3), np.nan)
-            for place, marker in enumerate(self.markers):
+            for index, marker in enumerate(self.markers):
                 if marker in trial.names:
-                    rows[:, place] = trial.positions[:, trial.names.index(marker)]
+                    rows[:, index] = trial.positions[:, trial.names.index(marker)]
             seen = np.flatnonzero(np.isfinite(rows).all(axis=2).sum(axis=1) >= FEWEST)
             taken = max(1, round(count * min(share, 1.0)))
             for frame in seen[np.unique(np.linspace(0, len(seen) - 1, taken).round().astype(int))] if len(seen) else ():

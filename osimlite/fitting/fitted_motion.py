@@ -79,11 +79,11 @@ class FittedMotion(Movement):
     @property
     def summary(self) -> dict[str, Any]:
         """Root mean square and largest of each kind of errors (m, rad), where they are worst, and what was not seen."""
-        found: dict[str, Any] = {"frames": len(self.times), "markers": len(self.markers)}
+        result: dict[str, Any] = {"frames": len(self.times), "markers": len(self.markers)}
         partly: dict[str, float] = {}
         kinds = [("marker", self.markers, self.marker_errors)]
         if self.sensors:
-            found["sensors"] = len(self.sensors)
+            result["sensors"] = len(self.sensors)
             kinds.append(("orientation", self.sensors, self.orientation_errors))
         for kind, names, errors in kinds:
             seen = np.isfinite(errors)
@@ -91,7 +91,7 @@ class FittedMotion(Movement):
                 filled = np.where(seen, errors, -1.0)
                 frame, one = np.unravel_index(int(filled.argmax()), filled.shape)
                 noun, time = ("marker", "worst_time") if kind == "marker" else ("sensor", "worst_sensor_time")
-                found |= {
+                result |= {
                     f"rms_{kind}_error": float(np.sqrt(np.mean(errors[seen] ** 2))),
                     f"largest_{kind}_error": float(filled.max()),
                     f"worst_{noun}": names[int(one)],
@@ -99,6 +99,6 @@ class FittedMotion(Movement):
                 }
             missing = (1.0 - seen.mean(axis=0)).tolist()
             partly |= {name: round(part, 4) for name, part in zip(names, missing, strict=True) if part}
-        found["partly_unseen"] = partly
-        found["frames_unseen"], found["frames_unsettled"] = len(self.unseen), len(self.unsettled)
-        return found
+        result["partly_unseen"] = partly
+        result["frames_unseen"], result["frames_unsettled"] = len(self.unseen), len(self.unsettled)
+        return result

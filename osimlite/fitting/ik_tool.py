@@ -122,27 +122,27 @@ def coordinate_table(name: str, folder: Path) -> StoTable | None:
 
 def told(motion: FittedMotion) -> Iterator[str]:
     """What a user should know of a motion, beside what OpenSim's documentation advises."""
-    found = motion.summary
-    if "rms_marker_error" in found:
-        rms, largest = found["rms_marker_error"], found["largest_marker_error"]
+    result = motion.summary
+    if "rms_marker_error" in result:
+        rms, largest = result["rms_marker_error"], result["largest_marker_error"]
         advised = "" if rms < ADVICE[0] and largest < ADVICE[1] else "; OpenSim advises less than 2 and 4 cm"
         advised += "; check the units of the data" if rms > ABSURD else ""
         yield (
-            f"{counted(found['frames'], 'frame')}, {counted(found['markers'], 'marker')}: "
+            f"{counted(result['frames'], 'frame')}, {counted(result['markers'], 'marker')}: "
             f"errors of {100.0 * rms:.2f} cm (root mean square), "
-            f"at most {100.0 * largest:.2f} cm ({found['worst_marker']} at {found['worst_time']:g} s){advised}"
+            f"at most {100.0 * largest:.2f} cm ({result['worst_marker']} at {result['worst_time']:g} s){advised}"
         )
-    if "rms_orientation_error" in found:
-        rms, largest = (math.degrees(found[f"{which}_orientation_error"]) for which in ("rms", "largest"))
+    if "rms_orientation_error" in result:
+        rms, largest = (math.degrees(result[f"{which}_orientation_error"]) for which in ("rms", "largest"))
         yield (
-            f"{found['frames']} frames, {found['sensors']} sensors: errors of {rms:.2f} degrees (root mean square), "
-            f"at most {largest:.2f} degrees ({found['worst_sensor']} at {found['worst_sensor_time']:g} s)"
+            f"{result['frames']} frames, {result['sensors']} sensors: errors of {rms:.2f} degrees (root mean square), "
+            f"at most {largest:.2f} degrees ({result['worst_sensor']} at {result['worst_sensor_time']:g} s)"
         )
-    if found["partly_unseen"]:
-        parts = [f"{name} ({100.0 * part:.3g} %)" for name, part in found["partly_unseen"].items()]
+    if result["partly_unseen"]:
+        parts = [f"{name} ({100.0 * part:.3g} %)" for name, part in result["partly_unseen"].items()]
         yield f"not seen in every frame: {listed(parts)}"
-    if found["frames_unseen"]:
-        frames = counted(found["frames_unseen"], "frame")
+    if result["frames_unseen"]:
+        frames = counted(result["frames_unseen"], "frame")
         yield f"{frames} in which nothing with a weight was seen: the pose stays as it was before"
-    if found["frames_unsettled"]:
-        yield f"in {counted(found['frames_unsettled'], 'frame')} the best pose was not reached"
+    if result["frames_unsettled"]:
+        yield f"in {counted(result['frames_unsettled'], 'frame')} the best pose was not reached"

@@ -186,9 +186,9 @@ def first_pose(mechanism: Mechanism, time: float, constraints: bool) -> Array:
 
 def marker_stations(model: Model, mechanism: Mechanism) -> dict[str, StationPlacement]:
     """Where the markers of a model are on its bodies, by their names; of markers that share a name the first."""
-    tree, found = model.tree(), dict[str, StationPlacement]()
+    tree, result = model.tree(), dict[str, StationPlacement]()
     for marker in model.components(ModelMarker):
         placed = mechanism.stations.get(tree.path_of(marker) or "")
         if placed is not None:
-            found.setdefault(marker.name, placed)
-    return found
+            result.setdefault(marker.name, placed)
+    return result

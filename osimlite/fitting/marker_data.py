@@ -91,7 +91,7 @@ def read_trc(path: str | Path) -> MarkerData:
             raise DocumentError(
                 f"the row has more than the {width} cells of {len(names)} markers", file=file, line=number
             )
-        rows.append([_number(cell, file, number, place) for place, cell in enumerate(cells[:width])])
+        rows.append([_number(cell, file, number, index) for index, cell in enumerate(cells[:width])])
         rows[-1] += [np.nan] * (width - len(rows[-1]))
     table = np.array(rows, dtype=float).reshape(-1, width)
     return MarkerData(names, table[:, 1], METRES[unit] * table[:, 2:].reshape(-1, len(names), 3), file)

@@ -80,11 +80,11 @@ class Person:
 
     def errors(self, places: Array) -> dict[str, float]:
         """Root mean square of the distances (m) by trial, of places as in `before` or `after`."""
-        found = {}
+        result = {}
         for trial in dict.fromkeys(self.trials):
             chosen = [name == trial for name in self.trials]
-            found[trial] = sqrt(float(np.nanmean(((places - self.measured)[chosen] ** 2).sum(axis=-1))))
-        return found
+            result[trial] = sqrt(float(np.nanmean(((places - self.measured)[chosen] ** 2).sum(axis=-1))))
+        return result
 
 
 def fit(
@@ -135,17 +135,17 @@ def fit(
     marked = {names[stations[marker].body] for marker in chosen.markers}
     segments = Segments.of(carriers, marked, by_axis=by_axis, symmetric=symmetric)
     search = _Search(Shape(model, chosen.markers, segments), chosen, [name in moving for name in chosen.markers])
-    found = search.start(mechanism)
-    before = found.places
+    result = search.start(mechanism)
+    before = result.places
     for _ in range(LOOKS):
-        found = search.run(found, NEARLY)
-        if not chosen.left_out(found.places):
+        result = search.run(result, NEARLY)
+        if not chosen.left_out(result.places):
             break
-    found = search.run(found, ENOUGH)
+    result = search.run(result, ENOUGH)
     scaled = model.copy_deep()
-    factors = segments.factors(found.sizes)
+    factors = segments.factors(result.sizes)
     scale_model(scaled, factors, mass)
-    offsets = {name: by for name, by in zip(chosen.markers, found.offsets, strict=True) if name in moving}
+    offsets = {name: by for name, by in zip(chosen.markers, result.offsets, strict=True) if name in moving}
     placements = Placements(scaled.tree())
     for marker in scaled.components(ModelMarker):
         if marker.name in offsets:
@@ -155,14 +155,14 @@ def fit(
     return Person(
         scaled,
         factors,
-        segments.factors(search.deviations(found)),
+        segments.factors(search.deviations(result)),
         offsets,
         tuple(chosen.trials),
         chosen.times,
         tuple(chosen.markers),
         chosen.measured,
         before,
-        found.places,
+        result.places,
         (*chosen.notes, *_at_ends(factors)),
     )
 
@@ -170,15 +170,15 @@ def fit(
 def _named(trials: Mapping[str, Markers] | Iterable[Markers], static: Markers | None) -> dict[str, MarkerData]:
     """All trials by name; the static one is called so."""
     if isinstance(trials, Mapping):
-        found = {name: MarkerData.of(trial) for name, trial in trials.items()}
+        result = {name: MarkerData.of(trial) for name, trial in trials.items()}
     else:
         read = [MarkerData.of(trial) for trial in trials]
-        found = {trial.file or f"trial {number}": trial for number, trial in enumerate(read, start=1)}
+        result = {trial.file or f"trial {number}": trial for number, trial in enumerate(read, start=1)}
     if static is not None:
-        found[STATIC] = MarkerData.of(static)
-    if not found:
+        result[STATIC] = MarkerData.of(static)
+    if not result:
         raise SettingError("there is nothing to fit; give at least one trial")
-    return found
+    return result
 
 
 def _at_ends(factors: Mapping[str, Sequence[float]]) -> Iterator[str]:

@@ -35,14 +35,14 @@ def person_texts(person: Person, generic: Path, folder: Path, mass: float = -1.0
         factors = person.factors.get(base.rsplit("/", 1)[1], [1.0, 1.0, 1.0])
         copy.location = tuple((np.array(marker.location) / factors).tolist())
     frames = [frame.name for frame in model.components(PhysicalFrame)]
-    found = Measured({name: person.factors.get(name, [1.0, 1.0, 1.0]) for name in frames}, {}, [])
+    result = Measured({name: person.factors.get(name, [1.0, 1.0, 1.0]) for name in frames}, {}, [])
     file = f"{generic.stem}_fitted.osim"
     tool = ScaleTool(
         name=model.name,
         mass=mass,
         generic_model_maker=GenericModelMaker(model_file=_way(generic, folder), marker_set_file=UNSCALED),
         model_scaler=ModelScaler(
-            scaling_order=("manualScale",), scale_set=scale_set(frames, found), output_model_file=file
+            scaling_order=("manualScale",), scale_set=scale_set(frames, result), output_model_file=file
         ),
         marker_placer=MarkerPlacer(apply=False),
     )
@@ -50,7 +50,7 @@ def person_texts(person: Person, generic: Path, folder: Path, mass: float = -1.0
         file: model,
         MARKERS: model.marker_set,
         UNSCALED: MarkerSet(name="markers", objects=unscaled),
-        FACTORS: scale_set(frames, found),
+        FACTORS: scale_set(frames, result),
         SETUP: tool,
     }
     return {name: to_text(document, numbers="opensim") for name, document in documents.items()}

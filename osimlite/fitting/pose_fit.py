@@ -128,20 +128,20 @@ class PoseFit:
             self.start(q)
         count, free = len(measured), len(self.order)
         given = measured.reshape(count, -1)
-        frames, found = np.empty((count, self.width)), np.empty((count, self.found))
+        frames, result = np.empty((count, self.width)), np.empty((count, self.found))
         frames[:, : self.measured] = given[:, : self.measured]
         frames[:, self.measured : self.measured + len(self._goals)] = given[:, self.measured :][:, self._goals]
         self.fill_held(frames, np.zeros(count) if times is None else np.asarray(times, dtype=float))
-        self.bound(frames, found)(count)
-        status = found[:, -1]
+        self.bound(frames, result)(count)
+        status = result[:, -1]
         if (status == APART).any():
             raise self.apart(int(np.argmax(status == APART)))
         values = np.tile(self.mechanism.values({}), (count, 1))
-        values[:, self.order] = found[:, :free]
-        vectors = found[:, free:-3].reshape(count, -1, 3)
+        values[:, self.order] = result[:, :free]
+        vectors = result[:, free:-3].reshape(count, -1, 3)
         unseen, unsettled = (tuple(np.flatnonzero(status == what).tolist()) for what in (UNSEEN, STUCK))
         places, turns = vectors[:, : self.markers], vectors[:, self.markers :]
-        return Poses(values, places, turns, found[:, -3], found[:, -2], unseen, unsettled)
+        return Poses(values, places, turns, result[:, -3], result[:, -2], unseen, unsettled)
 
     def bound(self, frames: Array, found: Array) -> Callable[[int], int]:
         """What fits a number of frames of arrays that the caller keeps, as the kernel takes them."""

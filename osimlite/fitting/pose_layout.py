@@ -215,13 +215,13 @@ def _allowed(coupler: Coupler, start: float, ends: tuple[float, float], low: flo
     start = min(max(start, ends[0]), ends[1])
     if not is_inside(start):
         return ends
-    found = []
+    result = []
     for end, side in zip(ends, (-1.0, 1.0), strict=True):
         furthest = end if np.isfinite(end) else start + side * 2.0 * np.pi
         scan = np.linspace(start, furthest, SCAN)
         outside = next((k for k, place in enumerate(scan.tolist()) if not is_inside(place)), None)
         if outside is None:
-            found.append(end)
+            result.append(end)
             continue
         inner, outer = float(scan[outside - 1]), float(scan[outside])
         while abs(outer - inner) > 1e-15 * (1.0 + abs(inner)):
@@ -229,5 +229,5 @@ def _allowed(coupler: Coupler, start: float, ends: tuple[float, float], low: flo
             if middle in (inner, outer):
                 break
             inner, outer = (middle, outer) if is_inside(middle) else (inner, middle)
-        found.append(inner)
-    return found[0], found[1]
+        result.append(inner)
+    return result[0], result[1]

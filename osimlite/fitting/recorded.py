@@ -97,7 +97,7 @@ class Recording:
         Raises:
             SettingError: there is no such name.
         """
-        places = {name: place for place, name in enumerate(self.names)}
+        places = {name: index for index, name in enumerate(self.names)}
         for name in names:
             if name not in places:
                 raise SettingError(f"there is no {self.noun} '{name}' in {self.source}{did_you_mean(name, self.names)}")

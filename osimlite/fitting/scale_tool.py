@@ -114,8 +114,8 @@ def scale(
             raise SettingError(f"factors of '{name}' are positive numbers, not {numbers}")
         by_hand.append(Scale(segment=name, scales=tuple(map(float, three))))
     measuring.by_hand(by_hand)
-    found, mechanism = measuring.found, measuring.mechanism
-    scale_model(copy, found.factors, mass, preserve_mass_distribution=preserve_mass_distribution, mechanism=mechanism)
+    results, mechanism = measuring.found, measuring.mechanism
+    scale_model(copy, results.factors, mass, preserve_mass_distribution=preserve_mass_distribution, mechanism=mechanism)
     result = Scaled(copy, measuring.found)
     if place and data is not None:
         result.placed = place_markers(copy, data, tasks, start, end)
@@ -190,9 +190,9 @@ def _scaled(tool: ScaleTool, model: Model, folder: Path) -> Measured:
             near = did_you_mean(word, (MEASUREMENTS, BY_HAND))
             raise SettingError(f"scaling_order has '{word}'; it consists of {MEASUREMENTS} and {BY_HAND}{near}")
     keeps = scaler.preserve_mass_distribution
-    found, mechanism = measuring.found, measuring.mechanism
-    scale_model(model, found.factors, tool.mass, preserve_mass_distribution=keeps, mechanism=mechanism)
-    return found
+    result, mechanism = measuring.found, measuring.mechanism
+    scale_model(model, result.factors, tool.mass, preserve_mass_distribution=keeps, mechanism=mechanism)
+    return result
 
 
 def add_markers(model: Model, path: Path) -> None:
@@ -201,10 +201,10 @@ def add_markers(model: Model, path: Path) -> None:
     Raises:
         DocumentError: the file holds no markers.
     """
-    found = read_any(path)
-    if not isinstance(found, MarkerSet):
-        raise DocumentError(f"the file holds a {type(found).__name__}, not a MarkerSet", file=str(path))
-    for marker in found.objects:
+    result = read_any(path)
+    if not isinstance(result, MarkerSet):
+        raise DocumentError(f"the file holds a {type(result).__name__}, not a MarkerSet", file=str(path))
+    for marker in result.objects:
         for same in [item for item in model.marker_set.objects if item.name == marker.name]:
             model.marker_set.objects.remove(same)
         model.marker_set.objects.append(marker.copy_deep())

@@ -96,20 +96,20 @@ def path_lengths(model: Model, mechanism: Mechanism | None = None) -> dict[str, 
         return {}
     from osimlite.simulation.paths import paths
 
-    found = paths(model, mechanism=mechanism)
-    lengths = found.lengths(found.mechanism.assemble({}))
+    result = paths(model, mechanism=mechanism)
+    lengths = result.lengths(result.mechanism.assemble({}))
     return {path: lengths[path] for path in (item.path for item in owners) if path in lengths}
 
 
 @cache
 def scales(cls: type[Any]) -> dict[str, str]:
     """What each property of a class is multiplied by when a model is scaled, see `Facts.scales`."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         facts = vars(base).get("facts")
         if isinstance(facts, Facts):
-            found.update(facts.scales)
-    return {name: rule for name, rule in found.items() if rule}
+            result.update(facts.scales)
+    return {name: rule for name, rule in result.items() if rule}
 
 
 def scale_inertia(body: Body, factors: Array, *, scales_mass: bool) -> None:

@@ -73,12 +73,12 @@ class Segments(NamedTuple):
 
     def factors(self, sizes: Sequence[float] | Array) -> dict[str, list[float]]:
         """The factors along the axes of each body, by its name, for numbers (k,)."""
-        found = {body: [1.0, 1.0, 1.0] for part in self.parts for body in part.bodies}
+        result = {body: [1.0, 1.0, 1.0] for part in self.parts for body in part.bodies}
         for part, size in zip(self.parts, sizes, strict=True):
             for body in part.bodies:
                 for axis in part.axes:
-                    found[body][axis] = float(size)
-        return found
+                    result[body][axis] = float(size)
+        return result
 
     def expected(self, first: float, apart: float, across: float) -> tuple[Array, Array]:
         """Rows (r, k) and what their products with the numbers usually are (r,), with standard deviations of 1.

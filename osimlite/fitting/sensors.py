@@ -48,17 +48,17 @@ def sensor_frames(model: Model, mechanism: Mechanism, wanted: Iterable[str]) -> 
     Raises:
         SettingError: there are none, or several of one name.
     """
-    tree, wanted, found = model.tree(), list(wanted), dict[str, FramePlacement]()
+    tree, wanted, result = model.tree(), list(wanted), dict[str, FramePlacement]()
     frames = [(frame.name, tree.path_of(frame) or "") for frame in model.components(PhysicalFrame)]
     for name, path in frames:
         if name in wanted:
-            if name in found:
+            if name in result:
                 raise SettingError(f"'{model.name}' has several frames '{name}'; a sensor has the name of one")
-            found[name] = mechanism.frames[path]
-    if not found:
+            result[name] = mechanism.frames[path]
+    if not result:
         near = did_you_mean(wanted[0], [name for name, _ in frames]) if wanted else ""
         raise SettingError(f"'{model.name}' has no frame that is called as a sensor ({listed(wanted)}){near}")
-    return found
+    return result
 
 
 def place_sensors(model: Model, data: OrientationData, base: str = "", axis: str = "") -> PlacedSensors:
@@ -121,10 +121,10 @@ def place_sensors(model: Model, data: OrientationData, base: str = "", axis: str
 
 def _only_one(frames: Iterable[PhysicalFrame], name: str, model: Model) -> PhysicalFrame | None:
     """The frame of a name, if there is one."""
-    found = [frame for frame in frames if frame.name == name]
-    if len(found) > 1:
+    result = [frame for frame in frames if frame.name == name]
+    if len(result) > 1:
         raise SettingError(f"'{model.name}' has several frames '{name}'; a sensor is worn on one")
-    return found[0] if found else None
+    return result[0] if result else None
 
 
 def _axis_of(rotation: Array, axis: str) -> Array:

@@ -156,5 +156,5 @@ class _Points:
     def _moving(self, values: Array, speeds: Array) -> Array:
         """What the kernels find of the links of the markers (t, m, ...)."""
         order, still = list(self._system.order), np.zeros((len(values), 1))
-        found = self._system.links_of(np.hstack((still, values[:, order], speeds[:, order])), self._carrying.tolist())
-        return found[:, self._links]
+        result = self._system.links_of(np.hstack((still, values[:, order], speeds[:, order])), self._carrying.tolist())
+        return result[:, self._links]

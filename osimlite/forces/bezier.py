@@ -68,7 +68,7 @@ def _polynomial(p: float, q: float, r: float, s: float) -> tuple[float, ...]:
 
 def _starts(x: Sequence[float], width: float) -> list[float]:
     """From where the search for u starts; it need not be exact."""
-    found: list[float] = []
+    result: list[float] = []
     low = 0.0
     for node in range(NODES + 1):
         high = 1.0
@@ -81,8 +81,8 @@ def _starts(x: Sequence[float], width: float) -> list[float]:
             if slope > 0.0:
                 u = min(max(u - (_times_u(x, u) - width * node / NODES) / slope, low), 1.0)
         slope = _derivative(x, u)
-        found += [u, width / NODES / slope if slope > 0.0 else 0.0]
-    return found
+        result += [u, width / NODES / slope if slope > 0.0 else 0.0]
+    return result
 
 
 def _times_u(x: Sequence[float], u: float) -> float:

@@ -152,6 +152,6 @@ def _above(slope: float, limit: float, name: str) -> None:
 
 def _given_or(given: tuple[float | None, ...], usual: tuple[float, ...], first: str) -> tuple[float, ...]:
     """What is given, or the usual if nothing is; the first property is that of `given`."""
-    found = [x for x in given if x is not None]
-    _require(len(found) in (0, len(usual)), f"its {first} and what follows it are neither all given nor all left out")
-    return tuple(found) or usual
+    result = [x for x in given if x is not None]
+    _require(len(result) in (0, len(usual)), f"its {first} and what follows it are neither all given nor all left out")
+    return tuple(result) or usual

@@ -234,7 +234,7 @@ def degroote_equilibrium(
     a = activation if m.follows else excitation
     low, high = 0.0, LARGEST_FORCE
     at_low = degroote_residual(low, length, rate, a, m, tendon)
-    found = at_low * degroote_residual(high, length, rate, a, m, tendon) < 0.0
+    result = at_low * degroote_residual(high, length, rate, a, m, tendon) < 0.0
     middle = low
     for _ in range(ROUNDS):
         if high - low <= CLOSE:
@@ -245,7 +245,7 @@ def degroote_equilibrium(
             high = middle
         else:
             low, at_low = middle, residual
-    return found, middle
+    return result, middle
 
 
 def degroote_residual(
@@ -253,8 +253,8 @@ def degroote_residual(
 ) -> float:
     """By how much the tendon's force exceeds what the fibers bear along it, if it does not change."""
     still = SmoothTendon(tendon.passive_strain, tendon.growth, tendon.elastic, 0.0)
-    found = degroote(length, rate, activation, activation, force, m, still)
-    return force - (found[6] + found[7]) / m.strength * found[3]
+    result = degroote(length, rate, activation, activation, force, m, still)
+    return force - (result[6] + result[7]) / m.strength * result[3]
 
 
 def meyer_active(length: float, scale: float) -> float:

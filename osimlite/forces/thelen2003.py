@@ -186,10 +186,10 @@ def force_at_velocity(m: Thelen2003, velocity: float, activation: float, isometr
     """
     force = isometric
     for _ in range(INVERSE_ROUNDS):
-        found, slope = fiber_velocity(m, force, activation, isometric)
+        result, slope = fiber_velocity(m, force, activation, isometric)
         if abs(slope) > SIGNIFICANT:
-            force -= (found - velocity) / slope
-        if abs(found - velocity) < enough:
+            force -= (result - velocity) / slope
+        if abs(result - velocity) < enough:
             return max(0.0, force / isometric)
     return nan
 

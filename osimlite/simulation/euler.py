@@ -78,14 +78,14 @@ class SemiImplicitEuler(Stepper):
             self._origin, self._since = limit, 0
         y = self._moved(h)
         if self._projected is not None:
-            found = self._projected(t, y, FIXED_STEP_TOLERANCE)
-            if found is None:
+            result = self._projected(t, y, FIXED_STEP_TOLERANCE)
+            if result is None:
                 raise IntegrationError(
                     f"the constraints cannot be kept up at t = {t:.9g} s; take a shorter fixed step than {h:g} s, "
                     "or control the error (--accuracy)",
                     t,
                 )
-            y = found
+            y = result
         if not isfinite(sum(y)):
             raise burst(t, self._h)
         try:

@@ -100,7 +100,7 @@ def words_to_controls(words: Iterable[str]) -> dict[str, Any]:
     Raises:
         OsimliteError: a word is neither, or two of them give the same control.
     """
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for word in words:
         name, equals, value = (part.strip() for part in word.partition("="))
         if (equals or not Path(word).suffix) and not Path(word).is_file():
@@ -110,10 +110,10 @@ def words_to_controls(words: Iterable[str]) -> dict[str, Any]:
                 raise SettingError(f"--controls takes a file, or NAME=VALUE with a number; got '{word}'") from None
         else:
             more = _by_name(word)
-        for key in more.keys() & found.keys():
+        for key in more.keys() & result.keys():
             raise SettingError(f"'{key}' is controlled twice; leave one out")
-        found |= more
-    return found
+        result |= more
+    return result
 
 
 def require_tables(controls: Controls, start: float, to: float) -> None:
@@ -136,10 +136,10 @@ def _by_name(given: Mapping[str, Any] | StoTable | str | Path) -> Mapping[str, A
     if not isinstance(given, str | Path | StoTable):
         raise SettingError(f"controls are a mapping of names, a table or a file, not {given!r}")
     table = given if isinstance(given, StoTable) else read_controls(given)
-    for place, label in enumerate(table.columns):
-        if label in table.columns[:place]:
+    for index, label in enumerate(table.columns):
+        if label in table.columns[:index]:
             raise SettingError(f"the table of controls has two columns '{label}'; leave one out")
-    return {label: (table.times, table.rows[:, place]) for place, label in enumerate(table.columns)}
+    return {label: (table.times, table.rows[:, index]) for index, label in enumerate(table.columns)}
 
 
 def _function(name: str, value: Any) -> Function:

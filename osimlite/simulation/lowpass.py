@@ -71,10 +71,10 @@ def _filtered(values: Array, cutoff: float) -> Array:
     sums = [3 * w**3 + 2 * w * w - 2 * w - 3, 3 * w**3 - 2 * w * w - 2 * w + 3, (w - 1.0) * (w * w - w + 1.0)]
     one, two, three = (total / scale for total in sums)
     taken = values[3:] + 3.0 * (values[2:-1] + values[1:-2]) + values[:-3]
-    found = np.concatenate([values[:3], w**3 / scale * taken])
+    result = np.concatenate([values[:3], w**3 / scale * taken])
     # One after the other: the numbers of slow filters are so near one another that blocks of rows lose seven digits.
-    for row, (third, second, first) in zip(found[3:], zip(found, found[1:], found[2:], strict=False), strict=False):
+    for row, (third, second, first) in zip(result[3:], zip(result, result[1:], result[2:], strict=False), strict=False):
         row -= one * first
         row -= two * second
         row -= three * third
-    return found
+    return result

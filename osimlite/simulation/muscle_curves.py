@@ -81,7 +81,7 @@ class MuscleCurves(Tabular):
         """The `columns` over ``muscle`` and the coordinates: a row for each muscle in each pose."""
         poses, count = self.poses, len(self.muscles)
         rows = {"muscle": np.tile(np.array(self.muscles, dtype=object), len(poses))}
-        rows |= {name: poses[:, place].repeat(count) for place, name in enumerate(self.values)}
+        rows |= {name: poses[:, index].repeat(count) for index, name in enumerate(self.values)}
         return rows, {name: column.ravel() for name, column in self.columns.items()}
 
     def to_xarray(self) -> Any:
@@ -148,15 +148,15 @@ def muscle_curves(
     tree = model.tree()
     optimal = {tree.path_of(item) or "": item.optimal_fiber_length for item in model.components(Muscle)}
     named = _chosen(list(optimal), muscles)
-    found = {element.path: element for element in forces.elements if isinstance(element, DeclaredForce)}
-    missing = [path for path in named if path not in found]
+    result = {element.path: element for element in forces.elements if isinstance(element, DeclaredForce)}
+    missing = [path for path in named if path not in result]
     if missing:
         # Says of which class it is, and why it cannot be computed.
         force_elements(model, mechanism, folder=folder)
     controls = Controls(forces.controls.names, ((Constant(activation),),) * len(forces.controls.names))
     free = mechanism.released()
     alone = [
-        _Muscle(found[path], System(free, Forces((found[path],), (), controls)), activation, optimal[path])
+        _Muscle(result[path], System(free, Forces((result[path],), (), controls)), activation, optimal[path])
         for path in named
     ]
     paths = Paths(model, wrapping)
@@ -170,12 +170,12 @@ def muscle_curves(
         q[places] = pose
         q = mechanism.assemble(q, kept=places)
         arms = paths.moment_arms(q)
-        for place, (path, muscle) in enumerate(zip(named, alone, strict=True)):
+        for index, (path, muscle) in enumerate(zip(named, alone, strict=True)):
             for name, value in muscle.at(q).items():
-                columns[name][number, place] = value
+                columns[name][number, index] = value
             for name, coordinate in zip(values, places, strict=True):
                 arm = arms[path].get(mechanism.coordinates[coordinate].path, 0.0)
-                columns[f"moment_arm_{name}"][number, place] = arm
+                columns[f"moment_arm_{name}"][number, index] = arm
         if progress is not None:
             progress(number + 1, len(poses))
     return replace(curves, columns=columns)
@@ -212,10 +212,10 @@ class _Muscle(NamedTuple):
         except SimulationError:
             is_settled = False
         known = {name: system.recorded(element.path, place) for name, place in element.kind.recorded.items()}
-        found = {"length": known["length"]}
+        result = {"length": known["length"]}
         if is_settled:
             cos, fibers = known["cos_pennation"], known["fiber_length"]
-            found |= {
+            result |= {
                 "fiber_length": fibers,
                 "normalized_fiber_length": fibers / self.optimal,
                 "tendon_length": known["length"] - fibers * cos,
@@ -223,4 +223,4 @@ class _Muscle(NamedTuple):
                 "active_fiber_force": known["active_fiber_force"] * cos,
                 "passive_fiber_force": known["passive_fiber_force"] * cos,
             }
-        return found
+        return result

@@ -91,21 +91,21 @@ class PathSystem(System):
             status = self._run(pull, self.program.ints, *parts, len(poses), states, forces)
         if status != layout.OK:
             raise self.refusal(status, 0.0, self._y.tolist())
-        found = np.zeros((*forces.shape[:2], poses.shape[1]))
-        found[:, :, self.order] = forces
-        return found
+        result = np.zeros((*forces.shape[:2], poses.shape[1]))
+        result[:, :, self.order] = forces
+        return result
 
     def nodes(self, q: Array, routes: Mapping[str, Along]) -> dict[str, list[tuple[int, Array]]]:
         """The nodes that each path through points runs through."""
         self._evaluated(q, np.zeros(len(q)))
-        found = {}
+        result = {}
         for (name, route), items in zip(routes.items(), self._items, strict=True):
             if isinstance(route, ThroughPoints):
                 record = self._w[items[-1][0] :]
                 order = record[ORDER : ORDER + int(record[COUNT])].astype(int)
                 work = record[ORDER + len(route.points) + 2 * len(route.surfaces) :]
-                found[name] = [(int(k), work[NODE_WORK * k + PLACE :][:3].copy()) for k in order]
-        return found
+                result[name] = [(int(k), work[NODE_WORK * k + PLACE :][:3].copy()) for k in order]
+        return result
 
     def on_surfaces(self, q: Array, routes: Mapping[str, Along]) -> dict[str, dict[str, float]]:
         """The lengths of each path on its surfaces, see :meth:`Paths.lengths_on_surfaces`."""
@@ -113,11 +113,11 @@ class PathSystem(System):
         # What the law of a surface says of a piece stays where it is until it is asked again.
         self._w[[part.length[1] for part in parts if part.length[1] >= 0]] = 0.0
         self._evaluated(q, np.zeros(len(q)))
-        found: dict[str, dict[str, float]] = {}
+        result: dict[str, dict[str, float]] = {}
         for part in parts:
             (length,) = self._length_on(part, lambda places: self._w[None, list(places)])
-            found.setdefault(part.path, {})[part.surface] = float(length)
-        return found
+            result.setdefault(part.path, {})[part.surface] = float(length)
+        return result
 
     def all_on_surfaces(self, poses: Array, routes: Mapping[str, Along]) -> Iterator[tuple[str, str, Array]]:
         """Owner and surface with the lengths (k,) of the one on the other in poses (k, n).
@@ -160,8 +160,8 @@ class PathSystem(System):
     def lengths_of(self, paths: Sequence[int], poses: Array) -> Array:
         """Length (k,) of one path, by number, in each of poses (k, n), m; NaN where it cannot be computed."""
         column = {path: k for k, path in enumerate(dict.fromkeys(paths))}
-        found = self.watched(poses, [self._items[path][-1][0] + LENGTH for path in column], paths)
-        of_each: Array = found[range(len(found)), [column[path] for path in paths]]
+        result = self.watched(poses, [self._items[path][-1][0] + LENGTH for path in column], paths)
+        of_each: Array = result[range(len(result)), [column[path] for path in paths]]
         return of_each
 
     def watched(
@@ -178,12 +178,12 @@ class PathSystem(System):
         Returns:
             Numbers (k, m); NaN in a pose in which the paths cannot be computed.
         """
-        states, found = np.zeros((len(poses), len(self._y))), np.empty((len(poses), len(places)))
+        states, result = np.zeros((len(poses), len(self._y))), np.empty((len(poses), len(places)))
         states[:, : len(self.order)] = poses[:, self.order]
         asked = np.full(len(poses), ALL) if paths is None else paths
         head = np.array([len(places), len(cleared), *places, *cleared], dtype=np.int64)
-        self._watch(states, head, np.array(asked, dtype=np.int64), found)
-        return found
+        self._watch(states, head, np.array(asked, dtype=np.int64), result)
+        return result
 
     def _watch(self, states: Array, head: NDArray[np.int64], asked: NDArray[np.int64], found: Array) -> None:
         parts = self.program.ints, self.numbers, self._w, self._y, self._f, len(states)

@@ -206,7 +206,7 @@ class Paths:
     def coupling_of_free(self, state: Kinematics) -> Array:
         """The same (n, n) in a pose at rest; a locked coordinate has the column of one that nothing goes with."""
         constraints = self.mechanism.constraints
-        free = [place for place in range(len(state.q)) if place not in self._locks]
+        free = [index for index in range(len(state.q)) if index not in self._locks]
         return _coupled(constraints, state, free if len(constraints) > len(self._locks) else [])
 
     @cached_property

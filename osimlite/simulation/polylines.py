@@ -113,9 +113,9 @@ class Polylines:
         self._poses[:, layout.POSITION : layout.POSITION + 3] = origins
         self._y[: len(q)] = q
         given = ints, self.numbers, self._w, self._y, self._f
-        found = []
+        result = []
         for item, trace in zip(self.items, self.traces, strict=True):
             code.entry(self.laws[self.structure[item + layout.LAW]])(*given, item)
             count = code.entry(self.laws[trace])(*given, item)
-            found.append(self._f[: 3 * count].reshape(-1, 3).copy())
-        return found
+            result.append(self._f[: 3 * count].reshape(-1, 3).copy())
+        return result

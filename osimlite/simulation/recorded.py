@@ -130,8 +130,8 @@ def _followed(
     if lowpass is not None:
         recorded = recorded.lowpassed(lowpass)
     if not (start <= recorded.times[-1] and end >= recorded.times[0]):
-        told = f"no time of the motion lies between {start:g} and {end:g} s"
-        raise SettingError(f"{told}; it is from {recorded.times[0]:g} to {recorded.times[-1]:g} s")
+        message = f"no time of the motion lies between {start:g} and {end:g} s"
+        raise SettingError(f"{message}; it is from {recorded.times[0]:g} to {recorded.times[-1]:g} s")
     if start > -np.inf or end < np.inf:
         recorded = recorded.between(start, end)
     return recorded.assembled() if assemble else recorded

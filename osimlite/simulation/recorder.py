@@ -91,10 +91,10 @@ class Recorder:
     def events(self) -> list[ContactEvent]:
         """All beginnings and ends in the order of their times; those at the start are the contacts there were."""
         self._catch_up()
-        found = [ContactEvent(self._start, name, True) for name in self._named(self.initially)]
+        result = [ContactEvent(self._start, name, True) for name in self._named(self.initially)]
         for change in self._changes:
-            found += sorted(self._times(change))
-        return found
+            result += sorted(self._times(change))
+        return result
 
     def _times(self, change: _Change) -> Iterator[ContactEvent]:
         """Bisect for every contact that changed within a step."""

@@ -122,9 +122,9 @@ def columns_of_states(labels: Sequence[str], paths: Iterable[str]) -> dict[str, 
         The places of the columns by the paths of those states that have one.
     """
     places: dict[str, int] = {}
-    for place, label in enumerate(labels):
-        places.setdefault(label, place)
-    found = {}
+    for index, label in enumerate(labels):
+        places.setdefault(label, index)
+    result = {}
     for path in paths:
         parts = path.strip("/").split("/")
         owner, what = parts[-2], parts[-1]
@@ -132,8 +132,8 @@ def columns_of_states(labels: Sequence[str], paths: Iterable[str]) -> dict[str, 
         ends = ("/".join(parts[k:]) for k in range(len(parts)))
         column = next((places[label] for label in (path, *ends, old) if label in places), None)
         if column is not None:
-            found[path] = column
-    return found
+            result[path] = column
+    return result
 
 
 def state_in(

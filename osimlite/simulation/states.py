@@ -77,8 +77,8 @@ class StateLayout:
     def __init__(self, mechanism: Mechanism, order: Sequence[int], elements: Iterable[Any] = ()) -> None:
         self.mechanism = mechanism
         self.order = tuple(order)
-        found = [variable for element in elements for variable in element.states]
-        self.variables = tuple(sorted(found, key=attrgetter("is_simbody")))
+        result = [variable for element in elements for variable in element.states]
+        self.variables = tuple(sorted(result, key=attrgetter("is_simbody")))
         self.size = 2 * len(self.order) + len(self.variables)
         self._still = [info.default_value for info in mechanism.coordinates]
 
@@ -144,15 +144,15 @@ class StateLayout:
         """States (k, y) with the auxiliary ones where they start from the values and speeds there."""
         if not self.variables:
             return states.copy()
-        found = np.empty((len(states), self.size))
+        result = np.empty((len(states), self.size))
         first = 2 * len(self.order)
-        found[:, :first] = states[:, :first]
+        result[:, :first] = states[:, :first]
         if any(callable(item.start) for item in self.variables):
             starts = [self._starts(y) for y in states.tolist()]
-            found[:, first:] = np.reshape(starts, (len(states), len(self.variables)))
+            result[:, first:] = np.reshape(starts, (len(states), len(self.variables)))
         else:
-            found[:, first:] = [item.start for item in self.variables]
-        return found
+            result[:, first:] = [item.start for item in self.variables]
+        return result
 
     def _starts(self, y: Sequence[float]) -> list[float]:
         """Where the auxiliary states start from values and speeds."""

@@ -49,15 +49,15 @@ def ideal(actuator: ScalarActuator, optimal_force: float) -> ScalarActuator | No
     """An actuator in the place of another one that pushes with its control times a force; None for an unusual one."""
     if isinstance(actuator, PathActuator):
         path = actuator.geometry_path.copy_deep()
-        found: ScalarActuator = PathActuator(name=actuator.name, geometry_path=path)
+        result: ScalarActuator = PathActuator(name=actuator.name, geometry_path=path)
     elif isinstance(actuator, ActivationCoordinateActuator):
-        found = CoordinateActuator(name=actuator.name, coordinate=actuator.coordinate)
+        result = CoordinateActuator(name=actuator.name, coordinate=actuator.coordinate)
     elif isinstance(actuator, CoordinateActuator | PointActuator | PointToPointActuator | TorqueActuator):
-        found = actuator.copy_deep()
+        result = actuator.copy_deep()
     else:
         return None
-    found.appliesForce, found.optimal_force = actuator.appliesForce, optimal_force
-    return found
+    result.appliesForce, result.optimal_force = actuator.appliesForce, optimal_force
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,10 +187,10 @@ class StaticOptimization:
         needed, pushes, strengths = system.pushed(moments, np.ascontiguousarray(udot[:, order]), self._paths)
         turned = ways[:, order]
         needed = (needed[:, None, :] @ turned)[:, 0]
-        found, lacking, solved = self._least(pushes @ turned, needed)
-        found[~solved] = np.nan
+        result, lacking, solved = self._least(pushes @ turned, needed)
+        result[~solved] = np.nan
         own = [1.0 if isinstance(item, Muscle) else item.optimal_force for item in self._actuators]
-        return Shared(times, self.names, found, strengths * own, self.coordinates, lacking, solved)
+        return Shared(times, self.names, result, strengths * own, self.coordinates, lacking, solved)
 
     def _least(self, columns: Array, needed: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Activations (t, a), what is missing (t, m), and whether nothing is (t,), for columns (t, a, m)."""
@@ -200,9 +200,9 @@ class StaticOptimization:
         sizes = np.array([frames, size, count, *[0] * (count * (size + 1))], dtype=np.int64)
         numbers = np.array([self._exponent, *self._bounds.ravel()])
         given = np.ascontiguousarray(np.hstack([columns.reshape(frames, -1), needed]))
-        found = np.zeros((frames, count + size + 1))
-        code.entry("least_effort")(sizes, numbers, given, found, np.zeros(effort_room(size, count)))
-        return found[:, :count], found[:, count:-1], found[:, -1] == 1.0
+        result = np.zeros((frames, count + size + 1))
+        code.entry("least_effort")(sizes, numbers, given, result, np.zeros(effort_room(size, count)))
+        return result[:, :count], result[:, count:-1], result[:, -1] == 1.0
 
     def _allowed(self, times: Array, values: Array, speeds: Array, wanted: Array) -> tuple[Array, Array]:
         """Accelerations (t, n) that the constraints allow, and what moves with each free coordinate (t, n, m).
@@ -243,7 +243,7 @@ class StaticOptimization:
         directions = turned[rank:].T
         free = directions[self._free]
         if np.linalg.matrix_rank(free) < directions.shape[1]:
-            names = [info.name for place, info in enumerate(self.mechanism.coordinates) if place not in self._free]
+            names = [info.name for index, info in enumerate(self.mechanism.coordinates) if index not in self._free]
             raise UnsupportedError(f"{listed(names)} can move apart from all coordinates that are to be accelerated")
         start = np.linalg.pinv(equations) @ targets
         back = np.linalg.pinv(free)
@@ -273,7 +273,7 @@ class StaticOptimization:
 def _idealised(model: Model, physiology: bool) -> list[ScalarActuator]:
     """The actuators that push, once those of a model that are no muscles push by their controls alone."""
     places = {id(force): number for number, force in enumerate(model.force_set.objects)}
-    found: list[ScalarActuator] = []
+    result: list[ScalarActuator] = []
     for item in list(model.components(Actuator)):
         if not item.appliesForce:
             continue
@@ -283,11 +283,11 @@ def _idealised(model: Model, physiology: bool) -> list[ScalarActuator]:
             force = item.max_isometric_force if isinstance(item, Muscle) else getattr(item, "optimal_force", 0.0)
             other = ideal(item, force)
             if other is None or id(item) not in places:
-                told = f"'{item.name}' ({type(item).__name__}) does not push in proportion to its control"
-                raise UnsupportedError(f"{told}; set its appliesForce to false")
+                message = f"'{item.name}' ({type(item).__name__}) does not push in proportion to its control"
+                raise UnsupportedError(f"{message}; set its appliesForce to false")
             other.min_control, other.max_control = item.min_control, item.max_control
             model.force_set.objects[places[id(item)]] = item = other
-        found.append(item)
-    if not found:
+        result.append(item)
+    if not result:
         raise ModelError(f"'{model.name}' has no actuators")
-    return found
+    return result

@@ -185,8 +185,8 @@ class System:
         and constraints make up for it. Moments and errors are those of :meth:`looked`.
         """
         first = int(self.structure[layout.WORK_LINK])
-        found = self.looked(moments, range(first, first + self._links.size), udot=udot)
-        return found.reshape(-1, *self._links.shape)
+        result = self.looked(moments, range(first, first + self._links.size), udot=udot)
+        return result.reshape(-1, *self._links.shape)
 
     def equilibrated(self, t: float, y: Sequence[float], numbers: Floats | None = None) -> list[float]:
         """A state (y,) with the auxiliary states that have an equilibrium in it, as Model::equilibrateMuscles gives it.
@@ -298,13 +298,13 @@ class System:
         law, code = "evaluate" if udot is None else "inverse", self.program.code
         code.make_ready(("look", law))
         moving = np.empty((len(moments), 0)) if udot is None else udot
-        given, found = np.ascontiguousarray(np.hstack([moments, moving])), np.empty((len(moments), len(places)))
+        given, result = np.ascontiguousarray(np.hstack([moments, moving])), np.empty((len(moments), len(places)))
         order = np.array([len(given), moving.shape[1], code.address(law), len(places), *places], dtype=np.int64)
-        parts = self.program.ints, self.numbers, self._w, self._y, self._f, stage, given, order, found
+        parts = self.program.ints, self.numbers, self._w, self._y, self._f, stage, given, order, result
         status = self._run(code.entry("look"), *parts)
         if status != layout.OK:
             raise self.refusal(status, float(self._w[layout.TIME]), self._y.tolist())
-        return found
+        return result
 
     def pushed(self, moments: Floats, udot: Floats, names: Sequence[str]) -> tuple[Floats, Floats, Floats]:
         """What accelerations need while no actuator pushes, and what each actuator pushes by a control of 1.
@@ -331,13 +331,13 @@ class System:
                 path = item - int(self.structure[item + layout.OWN + self._kind_at(name).text.heads])
                 (strength,) = self.places_of(name, (STRENGTH,))
             order += item, controls[name], path, strength
-        given, found = np.hstack([moments, udot]), np.empty((len(moments), size + len(names) * (size + 1)))
+        given, result = np.hstack([moments, udot]), np.empty((len(moments), size + len(names) * (size + 1)))
         parts = self.program.ints, self.numbers, self._w, self._y, self._f, code.address("inverse")
-        status = self._run(code.entry("push_each"), *parts, given, np.array(order, dtype=np.int64), found)
+        status = self._run(code.entry("push_each"), *parts, given, np.array(order, dtype=np.int64), result)
         if status != layout.OK:
             raise self.refusal(status, float(self._w[layout.TIME]), self._y.tolist())
-        each = found[:, size:].reshape(len(moments), len(names), size + 1)
-        return found[:, :size], each[:, :, :size], each[:, :, size]
+        each = result[:, size:].reshape(len(moments), len(names), size + 1)
+        return result[:, :size], each[:, :, :size], each[:, :, size]
 
     @cached_property
     def _records_at(self) -> dict[str, int]:
@@ -347,15 +347,15 @@ class System:
     def probe_results(self, t: float, y: Sequence[float]) -> list[list[float]]:
         """What each probe gives at a state, before its operation: one number for each of its labels."""
         self.applied(t, y)
-        found = []
+        result = []
         for probe, place in zip(self.probes, self._probe_places, strict=True):
             if probe.kind.measure is not None:
-                found.append(list(probe.kind.measure(probe, self, t, y)))
+                result.append(list(probe.kind.measure(probe, self, t, y)))
                 continue
             self.program.code.entry(probe.kind.name)(self.program.ints, self.numbers, self._w, self._y, self._f, place)
             first = self.structure[place + layout.RECORD]
-            found.append(self._w[first : first + len(probe.reading.labels)].tolist())
-        return found
+            result.append(self._w[first : first + len(probe.reading.labels)].tolist())
+        return result
 
     @property
     def places_of_controls(self) -> range:

@@ -90,7 +90,7 @@ class Trajectory(Tabular):
         (J). Surfaces of one force on the same body share their columns, which are those of the body.
         """
         labels, table = self._force_table
-        return {label: table[:, place] for place, label in enumerate(labels)}
+        return {label: table[:, index] for index, label in enumerate(labels)}
 
     @cached_property
     def _force_table(self) -> tuple[Sequence[str], Array]:
@@ -102,7 +102,7 @@ class Trajectory(Tabular):
     def probes(self) -> Mapping[str, Array]:
         """Columns (n,) of what the model's probes report, by the labels of OpenSim's ProbeReporter."""
         labels, table = self._probe_table
-        return {label: table[:, place] for place, label in enumerate(labels)}
+        return {label: table[:, index] for index, label in enumerate(labels)}
 
     @cached_property
     def _probe_table(self) -> tuple[Sequence[str], Array]:
@@ -139,9 +139,9 @@ class Trajectory(Tabular):
         They are called ``<coordinate>``, ``<coordinate>/speed``, and as in `auxiliary`, `forces` and `probes`.
         """
         columns: dict[str, Array] = {}
-        for place, name in enumerate(self.coordinates):
-            columns[name] = self.values[:, place]
-            columns[f"{name}/speed"] = self.speeds[:, place]
+        for index, name in enumerate(self.coordinates):
+            columns[name] = self.values[:, index]
+            columns[f"{name}/speed"] = self.speeds[:, index]
         return {**columns, **self.auxiliary, **self.forces, **self.probes}
 
     @property
@@ -172,8 +172,8 @@ class Trajectory(Tabular):
     def states_text(self) -> str:
         """The text of states.sto: all states, in the order of `paths`."""
         columns: dict[str, Array] = dict(self.auxiliary)
-        for place, info in enumerate(self.mechanism.coordinates):
-            columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = self.values[:, place], self.speeds[:, place]
+        for index, info in enumerate(self.mechanism.coordinates):
+            columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = self.values[:, index], self.speeds[:, index]
         rows = np.array([columns[path] for path in self.paths]).reshape(len(self.paths), len(self.times)).T
         return sto_text(self.mechanism.name, self.times.tolist(), self.paths, rows.tolist())
 

@@ -45,8 +45,8 @@ def run(job: Job, outcome: Outcome) -> None:
         kept = [(t, engine.equilibrated(t, y) if equilibrate else y) for t, y in rows]
         if not kept:
             raise job.error(f"there is nothing from {setup.initial_time:g} s to {setup.final_time:g} s")
-        times, found = zip(*kept, strict=True)
-        motion = Motion(model, simulation, np.array(times), np.array(found), record=record)
+        times, result = zip(*kept, strict=True)
+        motion = Motion(model, simulation, np.array(times), np.array(result), record=record)
         analyse(job, outcome, analyses, motion, first)
     tell_rows(job, outcome, motion)
 

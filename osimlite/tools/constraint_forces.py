@@ -52,8 +52,8 @@ class ConstraintForces:
             with suppress(np.linalg.LinAlgError):
                 factor = np.linalg.cholesky(MassCentres.of(state).mass_matrix()[np.ix_(order, order)])
                 rows, missing = (np.asarray(np.linalg.solve(factor, item), float) for item in (rows, missing))
-            found = shortest(rows, missing, SLIGHT * np.sqrt(rows.shape[1]))
-            parts = np.split(found, np.cumsum([len(block) for block in blocks])[:-1])
+            result = shortest(rows, missing, SLIGHT * np.sqrt(rows.shape[1]))
+            parts = np.split(result, np.cumsum([len(block) for block in blocks])[:-1])
             yield cls(state, list(zip(kept, parts, strict=True)))
 
     def on_bodies(self, constraint: Constraint, multipliers: Array) -> Array:

@@ -88,12 +88,12 @@ def steps_of(loads: Path, up: int) -> dict[str, Steps]:
     """
     document = read_object(loads, ExternalLoads)
     table = loads_table(document, loads.parent, str(loads))
-    found: dict[str, Array] = {}
+    result: dict[str, Array] = {}
     for force in document.objects:
         side, label = side_of(str(force.applied_to_body))[1], f"{(force.force_identifier or '').strip()}{'xyz'[up]}"
         if side and label in table.columns:
-            found[side] = found.get(side, 0.0) + table[label]
-    return {side: _steps(table.times, column > ON_GROUND) for side, column in found.items()}
+            result[side] = result.get(side, 0.0) + table[label]
+    return {side: _steps(table.times, column > ON_GROUND) for side, column in result.items()}
 
 
 def _steps(times: Array, stands: Any) -> Steps:

@@ -88,5 +88,5 @@ range {times[0]:f} {times[-1]:f}"""
     add("states_degrees.mot", StoTable(name, times, paths, rows * turning, in_degrees=True), simm)
     labels = tuple(path.rpartition("/")[2] for path in simulation.forces.controls.names)
     # Of a model without actuators OpenSim writes a table without rows.
-    found = motion.looked(motion.system.places_of_controls) if labels else np.empty((0, 0))
-    add("controls.sto", StoTable("controls", times[: len(found)], labels, found))
+    result = motion.looked(motion.system.places_of_controls) if labels else np.empty((0, 0))
+    add("controls.sto", StoTable("controls", times[: len(result)], labels, result))

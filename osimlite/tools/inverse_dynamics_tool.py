@@ -37,9 +37,9 @@ def run(job: Job, outcome: Outcome) -> None:
     table = recorded.inverse_dynamics(forces)
     outcome.table(job.in_results(setup.output_gen_force_file), table)
     if joints:
-        found = np.empty_like(table.rows)
-        found[:, [place for body in recorded.mechanism.bodies for place in body.mobilizer.coordinates]] = table.rows
-        at_joints = loads_at_joints(model, joints, recorded, found)
+        result = np.empty_like(table.rows)
+        result[:, [place for body in recorded.mechanism.bodies for place in body.mobilizer.coordinates]] = table.rows
+        at_joints = loads_at_joints(model, joints, recorded, result)
         outcome.table(job.in_results(setup.output_body_forces_file), at_joints)
     outcome.evidence = Evidence.of(
         model, job.needed("model_file"), recorded.mechanism, recorded.times, recorded.values, loads=loads
@@ -70,14 +70,14 @@ def _tell_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -> 
 def _joints(job: Job, model: Model, outcome: Outcome) -> list[Joint]:
     """The joints whose loads are asked for; OpenSim warns of those that are not there."""
     known = {joint.name: joint for joint in model.joint_set.objects}
-    found: list[Joint] = []
+    result: list[Joint] = []
     for name in map(str, job.setup.joints_to_report_body_forces):
         if name.upper() == "ALL":
-            found += known.values()
+            result += known.values()
             break
         if name in known:
-            found.append(known[name])
+            result.append(known[name])
         else:
-            told = f"there is no joint '{name}'{did_you_mean(name, known)}: its loads are left out, as in OpenSim"
-            outcome.tell("joints_to_report_body_forces", told)
-    return found
+            message = f"there is no joint '{name}'{did_you_mean(name, known)}: its loads are left out, as in OpenSim"
+            outcome.tell("joints_to_report_body_forces", message)
+    return result

@@ -32,8 +32,8 @@ def loads_at_joints(model: Model, joints: Sequence[Joint], recorded: RecordedMot
         forces: generalized forces (t, n) in the order of the mechanism.
     """
     mechanism, placements = recorded.mechanism, Placements(model.tree())
-    carried = {body.path: place for place, body in enumerate(mechanism.bodies)}
-    by_joint = {body.mobilizer.joint: place for place, body in enumerate(mechanism.bodies)}
+    carried = {body.path: index for index, body in enumerate(mechanism.bodies)}
+    by_joint = {body.mobilizer.joint: index for index, body in enumerate(mechanism.bodies)}
     asked, labels = [], []
     for joint in joints:
         frame = placements.named(joint, "socket_child_frame")

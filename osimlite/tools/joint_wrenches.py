@@ -34,7 +34,7 @@ class JointWrenches:
         if self.mechanism.constrained:
             for links, forces in zip(self.moved.links, ConstraintForces.along(motion), strict=True):
                 self._push(links, forces)
-        self.carried = {body.mobilizer.joint: place for place, body in enumerate(self.mechanism.bodies)}
+        self.carried = {body.mobilizer.joint: index for index, body in enumerate(self.mechanism.bodies)}
 
     def _push(self, links: Array, forces: ConstraintForces) -> None:
         """Let constraints push bodies (l, n), and all that carry them."""

@@ -136,8 +136,8 @@ def run_many(
             work.share(do, workers, cluster)
     except KeyboardInterrupt:
         journal.save()
-        told = f"interrupted after {len(work.trials)} of {counted(len(setups), 'setup')}"
-        raise Interrupted(f"{told}; go on with --resume") from None
+        message = f"interrupted after {len(work.trials)} of {counted(len(setups), 'setup')}"
+        raise Interrupted(f"{message}; go on with --resume") from None
     trials = [work.trials[setup] for setup in setups]
     _tell_clashes(trials)
     journal.end(trials)

@@ -102,8 +102,8 @@ class Motion:
     def histories(self) -> dict[str, Array]:
         """All states (t,) by their paths, in OpenSim's order."""
         columns = self.simulation.state.auxiliary_histories(self.states)
-        for place, info in enumerate(self.mechanism.coordinates):
-            columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = self.values[:, place], self.speeds[:, place]
+        for index, info in enumerate(self.mechanism.coordinates):
+            columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = self.values[:, index], self.speeds[:, index]
         return {path: columns[path] for path in self.simulation.paths}
 
     def looked(self, places: Sequence[int], stage: int = FORCE_STAGE) -> Array:
@@ -113,16 +113,16 @@ class Motion:
     def known(self, paths: Sequence[str], *names: str) -> dict[str, Array]:
         """What is known of force elements of some paths at every time (t, m), by the names of their kinds."""
         places = [place for path in paths for place in self.system.places_of(path, names)]
-        found = self.looked(places).reshape(len(self.times), len(paths), len(names))
-        return {name: found[:, :, k] for k, name in enumerate(names)}
+        result = self.looked(places).reshape(len(self.times), len(paths), len(names))
+        return {name: result[:, :, k] for k, name in enumerate(names)}
 
     @cached_property
     def accelerations(self) -> Array:
         """Derivatives of the speeds (t, n), by all that acts on the model."""
-        order, found = list(self.simulation.state.order), np.zeros_like(self.values)
+        order, result = list(self.simulation.state.order), np.zeros_like(self.values)
         first = self.system.room + len(order)
-        found[:, order] = self.looked(range(first, first + len(order)), ACCELERATION_STAGE)
-        return found
+        result[:, order] = self.looked(range(first, first + len(order)), ACCELERATION_STAGE)
+        return result
 
     @cached_property
     def wanted(self) -> Array:
@@ -134,10 +134,10 @@ class Motion:
         assert self.record is not None
         times, speeds = self.record()
         if len(times) < LEAST_TIMES:
-            told = f"the motion has {counted(len(times), 'time')}; accelerations need at least {LEAST_TIMES}"
-            raise SettingError(told)
-        (found,) = derivatives_of_samples(times, speeds, self.times, (1,), LEAST_TIMES // 2)
-        return found
+            message = f"the motion has {counted(len(times), 'time')}; accelerations need at least {LEAST_TIMES}"
+            raise SettingError(message)
+        (result,) = derivatives_of_samples(times, speeds, self.times, (1,), LEAST_TIMES // 2)
+        return result
 
     @cached_property
     def links(self) -> LinkMotion:
@@ -149,8 +149,8 @@ class Motion:
     def frame(self, asked: str, kind: str, *places: str) -> str | None:
         """The path of a frame of a class that is found by its path from the model, or from other places there."""
         tree = self.model.tree()
-        found = (tree.walk(asked, place, kind).target for place in ("", *places))
-        return next((tree.path_of(item) for item in found if item is not None), None)
+        result = (tree.walk(asked, place, kind).target for place in ("", *places))
+        return next((tree.path_of(item) for item in result if item is not None), None)
 
     def chosen(self, wanted: Sequence[Any], names: Sequence[str], what: str) -> list[int]:
         """Places of the names that an analysis asks for; "all" stands for all of them.

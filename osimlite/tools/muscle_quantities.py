@@ -52,7 +52,7 @@ def quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> Tables:
     # The fibers keep their distance across the tendon.
     turning = -speed / length * np.tan(angle)
     along = speed * cos - length * np.sin(angle) * turning
-    found = {
+    result = {
         "PennationAngle": angle,
         "Length": known["length"],
         "FiberLength": length,
@@ -72,7 +72,7 @@ def quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> Tables:
         "TendonPower": -tension * (known["rate"] - along),
         "MuscleActuatorPower": -tension * known["rate"],
     }
-    return found | CHECKED[type(muscles[0])](found, muscles)
+    return result | CHECKED[type(muscles[0])](result, muscles)
 
 
 def _thelen(found: Tables, muscles: Sequence[Any]) -> Tables:

@@ -97,8 +97,8 @@ class Outcome:
         """Refuse to write over what the results come from. A model may take the place of the one it was made of."""
         kept = [path for path in self._texts if path.name in self.tables or path.suffix.lower() != ".osim"]
         for path in inputs_among(kept, setup):
-            told = f"a result would replace '{path}', which it is computed from; give it another name or place"
-            raise DocumentError(told, file=str(setup))
+            message = f"a result would replace '{path}', which it is computed from; give it another name or place"
+            raise DocumentError(message, file=str(setup))
 
     def write(self, setup: Path) -> None:
         """Write what is still to be written, all files whole or none of them.

@@ -123,9 +123,9 @@ def _central(mechanism: Any, q: Array, u: Array) -> Array:
 def _com_acceleration(mechanism: Any, q: Array, u: Array, udot: Array) -> Array:
     accelerations, rows = mechanism.at(q, u).accelerations(udot), []
     state = mechanism.at(q, u)
-    for place, body in enumerate(mechanism.bodies):
-        arm = state.rotations[place] @ body.mass_properties.center
-        w, own = state.velocities[place][:3], accelerations[place]
+    for index, body in enumerate(mechanism.bodies):
+        arm = state.rotations[index] @ body.mass_properties.center
+        w, own = state.velocities[index][:3], accelerations[index]
         rows.append(body.mass_properties.mass * (own[3:] + np.cross(own[:3], arm) + np.cross(w, np.cross(w, arm))))
     return np.asarray(np.sum(rows, axis=0) / (mechanism.total_mass or 1.0))
 

@@ -10,16 +10,16 @@ from osimlite.tools.outcome import Outcome
 
 def run(job: Job, outcome: Outcome) -> None:
     """Scale the model and place its markers; write models, factors and the pose that the setup names."""
-    found = run_scale(job.setup, job.file.parent)
-    for name, text in found.texts.items():
+    result = run_scale(job.setup, job.file.parent)
+    for name, text in result.texts.items():
         outcome.text(job.result(name), text)
-    if found.measured is not None:
-        outcome.summary["ratios"] = dict(found.measured.ratios)
-        for name, ratio in found.measured.ratios.items():
+    if result.measured is not None:
+        outcome.summary["ratios"] = dict(result.measured.ratios)
+        for name, ratio in result.measured.ratios.items():
             outcome.tell(name, f"{ratio:.6g}")
-        for note in found.measured.notes:
+        for note in result.measured.notes:
             outcome.tell("left out", note)
-    if found.placed is not None:
-        outcome.summary |= found.placed.pose.summary
-        for words in told(found.placed.pose):
+    if result.placed is not None:
+        outcome.summary |= result.placed.pose.summary
+        for words in told(result.placed.pose):
             outcome.tell("markers", words)

@@ -43,16 +43,16 @@ def analyses_of(job: Job) -> Analyses:
         NotRunnable: there is no module for one.
     """
     setup: AbstractTool = job.setup
-    found = []
+    result = []
     for item in setup.analysis_set.objects:
         if item.on:
             tag = type(item).__name__
             name = f"{_ANALYSES}.{module_name(tag)}"
             if find_spec(name) is None:
-                told = f"the analysis '{item.name}' is a {tag}, which cannot be computed yet"
-                raise NotRunnable(told, file=str(job.file))
-            found.append((item, import_module(name)))
-    return found
+                message = f"the analysis '{item.name}' is a {tag}, which cannot be computed yet"
+                raise NotRunnable(message, file=str(job.file))
+            result.append((item, import_module(name)))
+    return result
 
 
 def analyse(job: Job, outcome: Outcome, analyses: Analyses, motion: Motion, first: int = 0) -> None:
@@ -103,8 +103,10 @@ def told_model(job: Job) -> Model:
         model.controller_set.objects.append(own)
     for controller in model.components(CorrectionController):
         if controller.enabled:
-            told = f"'{controller.name}', a CorrectionController, cannot be computed yet; say <enabled>false</enabled>"
-            raise NotRunnable(told, file=str(job.file))
+            message = (
+                f"'{controller.name}', a CorrectionController, cannot be computed yet; say <enabled>false</enabled>"
+            )
+            raise NotRunnable(message, file=str(job.file))
     return model
 
 
@@ -178,11 +180,11 @@ class StateRows(NamedTuple):
 
     def speeds(self, simulation: Simulation) -> Array:
         """The generalized speeds of all rows (t, n); what has no column is 0."""
-        found = np.zeros((len(self.table.times), len(simulation.mechanism.coordinates)))
-        for place, info in enumerate(simulation.mechanism.coordinates):
+        result = np.zeros((len(self.table.times), len(simulation.mechanism.coordinates)))
+        for index, info in enumerate(simulation.mechanism.coordinates):
             if (column := self.columns.get(f"{info.path}/speed")) is not None:
-                found[:, place] = self.table.rows[:, column]
-        return found
+                result[:, index] = self.table.rows[:, column]
+        return result
 
     def tell(self, outcome: Outcome) -> None:
         """Say which states were not in the file."""

@@ -55,9 +55,9 @@ def test_what_is_read_is_what_typer_reads(name: str, data: st.DataObject) -> Non
         st.builds(lambda left, right: (f"{left}={right}",), option, word),
     )  # fmt: skip
     words = ["walker.osim", *(each for few in data.draw(st.lists(part, max_size=5)) for each in few)]
-    found = loaded(name).read(words)
-    if found is not None:
-        assert found == by_typer(name, words, pytest.MonkeyPatch()), words
+    result = loaded(name).read(words)
+    if result is not None:
+        assert result == by_typer(name, words, pytest.MonkeyPatch()), words
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -65,8 +65,8 @@ def test_defaults_are_those_of_typer(name: str, monkeypatch: pytest.MonkeyPatch)
     needed = [each for each in loaded(name).parameters() if each.default is ...]
     words = [f for each in needed for f in ("x",) if each.declared.maker == "Argument"]
     words += [f for each in needed if each.declared.maker == "Option" for f in (next(iter(each.spellings)), "x")]
-    found = loaded(name).read(words)
-    assert found is not None and found == by_typer(name, words, monkeypatch)
+    result = loaded(name).read(words)
+    assert result is not None and result == by_typer(name, words, monkeypatch)
 
 
 def test_what_is_wrong_is_left_to_typer() -> None:

@@ -35,17 +35,19 @@ def run(*arguments: str) -> tuple[int, str]:
 def test_every_extra_has_a_purpose() -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     assert {*extras, ""} - {*EXTRAS} == {"all", "dev", "fast"}
-    found = purposes(requirements())
-    assert all(found[extra] for extra in EXTRAS)
-    assert sorted(use for uses in found.values() for use in uses) == sorted(NEEDS)
-    assert "translate" in found["sim"] and "view --screenshot" in found["view"] and "simulate --gui" in found["bullet"]
+    result = purposes(requirements())
+    assert all(result[extra] for extra in EXTRAS)
+    assert sorted(use for uses in result.values() for use in uses) == sorted(NEEDS)
+    assert (
+        "translate" in result["sim"] and "view --screenshot" in result["view"] and "simulate --gui" in result["bullet"]
+    )
 
 
 def test_a_use_belongs_to_the_first_extra_that_brings_all_it_needs() -> None:
     wanted = {"": ["lxml"], "sim": ["numba", "numpy"], "view": ["numpy", "pillow"], "more": ["numpy", "pillow"]}
-    found = purposes(wanted)
-    assert "validate" in found[""] and "kinematics" in found["sim"] and "view --screenshot" in found["view"]
-    assert not any("optimize" in uses for uses in found.values())
+    result = purposes(wanted)
+    assert "validate" in result[""] and "kinematics" in result["sim"] and "view --screenshot" in result["view"]
+    assert not any("optimize" in uses for uses in result.values())
 
 
 MODULES = {"pillow": "PIL", "pyyaml": "yaml", "rerun-sdk": "rerun"}

@@ -46,13 +46,13 @@ def test_help_fits_80_columns(application, command, monkeypatch):
 
 
 def test_an_option_is_the_same_in_every_command(application):
-    found = defaultdict(set)
+    result = defaultdict(set)
     for command in get_command(application).commands.values():
         for option in command.params:
             if option.param_type_name == "option":
                 name = max(option.opts, key=len)
-                found[name].add((tuple(option.opts), option.metavar, option.help))
-    different = {name for name, forms in found.items() if len(forms) > 1}
+                result[name].add((tuple(option.opts), option.metavar, option.help))
+    different = {name for name, forms in result.items() if len(forms) > 1}
     assert different == set(MEANINGS)
-    spellings = {name: {form[0] for form in forms} for name, forms in found.items()}
+    spellings = {name: {form[0] for form in forms} for name, forms in result.items()}
     assert all(len(each) == 1 for each in spellings.values()), spellings

@@ -112,8 +112,8 @@ def test_fixed_step(walker, tmp_path):
 def test_failure_says_one_sentence_and_leaves_nothing(walker, tmp_path, arguments, code, words):
     if "--gui" in arguments:
         pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
-    found, out, err = run("simulate", walker, *arguments, "-o", "r", folder=tmp_path)
-    assert found == code and out == ""
+    result, out, err = run("simulate", walker, *arguments, "-o", "r", folder=tmp_path)
+    assert result == code and out == ""
     assert len(err.splitlines()) == 1 and words in err
     assert list(tmp_path.iterdir()) == []
 
@@ -185,7 +185,7 @@ def test_a_motion_goes_on_from_a_file_of_states(tmp_path):
     one, two = (read_sto(tmp_path / folder / "states.sto") for folder in ("one", "two"))
     changed = one.columns.index("/jointset/j1/q1/value")
     assert two.rows[0, changed] == 0.25 and one.columns == two.columns
-    same = [place for place in range(len(one.columns)) if place != changed]
+    same = [index for index in range(len(one.columns)) if index != changed]
     assert two.rows[0, same].tolist() == one.rows[-1, same].tolist()
 
 

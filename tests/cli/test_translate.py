@@ -102,8 +102,8 @@ def test_a_file_of_mujocos_is_checked_against_its_model(tmp_path: Path) -> None:
     assert run("translate", "one.osim", "--to", "mjcf", "-o", "native", folder=tmp_path)[0] == 0
     code, out, _ = run("translate", "one.osim", "--check", "native/one.xml", "-o", "checked", folder=tmp_path)
     assert code == 0 and "one.xml: root mean square errors" in out and "mu " in out
-    (found,) = json.loads((tmp_path / "checked/check.json").read_text())["muscles"]
-    assert found["length"]["max"] < 1e-12 and found["fiber"] == pytest.approx(1.0) and found["force"]["rms"] < 0.2
+    (result,) = json.loads((tmp_path / "checked/check.json").read_text())["muscles"]
+    assert result["length"]["max"] < 1e-12 and result["fiber"] == pytest.approx(1.0) and result["force"]["rms"] < 0.2
     code, _, error = run("translate", "one.osim", "--check", "gone.xml", folder=tmp_path)
     assert code == 2 and "gone.xml: MuJoCo does not load it" in error
 

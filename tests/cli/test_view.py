@@ -45,8 +45,8 @@ def test_a_page_and_a_picture_are_written(walker: Path, capsys: pytest.CaptureFi
 
 def test_coordinates_can_be_set(walker: Path) -> None:
     assert run("walker.osim", "--set", "RKnee_rz=-30deg", "--html", "page.html") == 0
-    found = re.search(r'"q":\[([^]]*)\]', (walker / "page.html").read_text())
-    assert found and "-0.523598775598298" in found[1]
+    result = re.search(r'"q":\[([^]]*)\]', (walker / "page.html").read_text())
+    assert result and "-0.523598775598298" in result[1]
 
 
 @pytest.mark.parametrize(

@@ -48,12 +48,12 @@ def test_same_accelerations(corpus_model):
     for seed in range(2):
         q, u = state_near(mechanism, seed)
         try:
-            found = bare.acceleration(0.0, q, u)
+            result = bare.acceleration(0.0, q, u)
         except SimulationError:
             with pytest.raises(SimulationError, match="no mass"):
                 mechanism.acceleration(q, u)
             return
-        assert largest_difference(found, mechanism.acceleration(q, u)) < 1e-9 * scale
+        assert largest_difference(result, mechanism.acceleration(q, u)) < 1e-9 * scale
     forces = force_elements(model, mechanism, skip_unsupported=True, folder=corpus_model.path.parent)
     ours, theirs = CompiledEngine(mechanism, forces), make(mechanism, forces, Settings())
     with theirs:
@@ -76,9 +76,9 @@ def test_same_accelerations_under_constraints(corpus_model):
     forces = force_elements(model, mechanism, skip_unsupported=True, folder=corpus_model.path.parent)
     ours, theirs = CompiledEngine(mechanism, forces), make(mechanism, forces, Settings())
     y = ours.state.pack(*state_near(mechanism, 3))
-    found = ours.projected(0.1, y, 1e-10)
-    assert found is not None
-    q, u = ours.state.values(found), ours.state.speeds(found)
+    result = ours.projected(0.1, y, 1e-10)
+    assert result is not None
+    q, u = ours.state.values(result), ours.state.speeds(result)
     with theirs:
         try:
             expected = theirs.acceleration(0.1, q, u)
@@ -97,7 +97,7 @@ def conditioning(mechanism):
     """How many times more than usual rounding counts: a thousandth of the condition of the mass matrix, or 1."""
     q, _ = state_near(mechanism, 0)
     matrix = mechanism.mass_matrix(q)
-    free = [place for place, info in enumerate(mechanism.coordinates) if not info.locked and matrix[place, place] > 0]
+    free = [index for index, info in enumerate(mechanism.coordinates) if not info.locked and matrix[index, index] > 0]
     if not free:
         return 1.0
     own = matrix[np.ix_(free, free)]

@@ -48,12 +48,12 @@ class Block(NamedTuple):
 
 
 def blocks(text: str) -> list[Block]:
-    found = []
+    result = []
     for match in _BLOCK.finditer(text):
         part = "code" if match["fence"] else "table"
         line = text.count("\n", 0, match.start(part)) + 1
-        found.append(Block(match["language"] if match["fence"] else part, match[part], line, match["why"]))
-    return found
+        result.append(Block(match["language"] if match["fence"] else part, match[part], line, match["why"]))
+    return result
 
 
 @pytest.fixture
@@ -145,8 +145,8 @@ def test_the_code_of_a_table_is_found_and_fails() -> None:
 
 
 def test_a_block_that_is_not_run_is_found() -> None:
-    found = blocks("a\n\n<!-- not run: it takes an hour -->\n```sh\nsleep 3600\n```\n\n```python\nx = 1\n```\n")
-    assert found == [Block("sh", "sleep 3600\n", 5, "it takes an hour"), Block("python", "x = 1\n", 9, None)]
+    result = blocks("a\n\n<!-- not run: it takes an hour -->\n```sh\nsleep 3600\n```\n\n```python\nx = 1\n```\n")
+    assert result == [Block("sh", "sleep 3600\n", 5, "it takes an hour"), Block("python", "x = 1\n", 9, None)]
 
 
 def test_the_reference_tells_of_all_that_the_package_exports() -> None:

@@ -149,8 +149,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 def marker(model: Model) -> Marker:
-    (found,) = model.marker_set.objects
-    return found
+    (result,) = model.marker_set.objects
+    return result
 
 
 def test_an_object_may_stand_in_a_file_of_its_own(folder: Path) -> None:

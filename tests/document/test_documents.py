@@ -76,10 +76,10 @@ def test_a_tool_made_in_python(tmp_path: Path) -> None:
 
 
 def test_an_unknown_tag_is_kept_and_told(fixtures: Path) -> None:
-    found = read_document(Source.of_file(fixtures / "documents" / "forward.xml"), of=Object)
-    (note,) = found.notes
-    assert (note.kind, note.word, found.source.of_tag(note.number).line) == ("unknown-tag", "use_specified_dt", 6)
-    assert "<use_specified_dt>true</use_specified_dt>" in osimlite.to_text(found.top)
+    result = read_document(Source.of_file(fixtures / "documents" / "forward.xml"), of=Object)
+    (note,) = result.notes
+    assert (note.kind, note.word, result.source.of_tag(note.number).line) == ("unknown-tag", "use_specified_dt", 6)
+    assert "<use_specified_dt>true</use_specified_dt>" in osimlite.to_text(result.top)
 
 
 def test_old_names_at_the_top() -> None:

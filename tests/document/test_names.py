@@ -37,29 +37,29 @@ def test_a_namespace_changes_no_element(head: str) -> None:
 
 def test_namespaces_inside_a_model_are_attributes_that_stay() -> None:
     text = f'{HEAD}><Model xmlns="a" xml:space="preserve" o:id="3">{REST}'
-    found = read(text)
-    assert [note.word for note in found.notes] == ["xmlns", "xml:space", "o:id"]
-    written = osimlite.to_text(found.model)
+    result = read(text)
+    assert [note.word for note in result.notes] == ["xmlns", "xml:space", "o:id"]
+    written = osimlite.to_text(result.model)
     assert '<Model xmlns="a" xml:space="preserve" o:id="3">' in written
-    assert osimlite.read_text(written) == found.model
+    assert osimlite.read_text(written) == result.model
 
 
 @pytest.mark.parametrize("tag", ["o:mass", "mass:", "a:b:c", "OpenSim::mass", "xml:mass"])
 def test_a_name_with_a_colon_is_another_name(tag: str) -> None:
-    found = read(
+    result = read(
         f"{HEAD} xmlns:o='u'><Model>{REST}".replace("<mass>2</mass>", f"<mass>2</mass><{tag} o:a='1'>3</{tag}>")
     )
-    assert [(note.kind, note.word) for note in found.notes] == [("unknown-tag", tag)]
-    written = osimlite.to_text(found.model)
+    assert [(note.kind, note.word) for note in result.notes] == [("unknown-tag", tag)]
+    written = osimlite.to_text(result.model)
     assert f'<{tag} o:a="1">3</{tag}>' in written
-    assert osimlite.read_text(written) == found.model
+    assert osimlite.read_text(written) == result.model
 
 
 def test_what_is_no_name_keeps_its_colons() -> None:
     inside = "<Body name='a:b'><x><![CDATA[<o:p xmlns='q'>]]></x></Body><!-- <o:p xmlns='q'> a:b -->"
-    found = read(f"{HEAD}><Model><BodySet><objects>{inside}</objects></BodySet></Model></OpenSimDocument>")
-    assert found.model.body_set.objects[0].name == "a:b"
-    written = osimlite.to_text(found.model)
+    result = read(f"{HEAD}><Model><BodySet><objects>{inside}</objects></BodySet></Model></OpenSimDocument>")
+    assert result.model.body_set.objects[0].name == "a:b"
+    written = osimlite.to_text(result.model)
     assert "&lt;o:p xmlns='q'&gt;" in written
     assert "<!-- <o:p xmlns='q'> a:b -->" in written
 

@@ -204,11 +204,11 @@ def test_an_output_of_a_plugin_is_one(folder):
     Path("classes.json").write_text(json.dumps(classes))
     reporter = '<TableReporter__double_ name="t"> <input_inputs>/patch|{}</input_inputs> </TableReporter__double_>'
     text = Path("m.osim").read_text()
-    found = []
+    result = []
     for word in ("flow", "flou"):
         Path("m.osim").write_text(text.replace("\t\t</components>", reporter.format(word) + "\t\t</components>"))
-        found.append([(each.code, each.suggestion) for each in validate("m.osim", classes="classes.json")])
-    assert found == [[], [("OSIM332", "/patch|flow")]]
+        result.append([(each.code, each.suggestion) for each in validate("m.osim", classes="classes.json")])
+    assert result == [[], [("OSIM332", "/patch|flow")]]
 
 
 def test_a_class_may_derive_from_any(folder):

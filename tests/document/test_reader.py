@@ -54,48 +54,48 @@ def test_every_element_keeps_its_number(fixtures: Path) -> None:
 
 
 def test_properties_in_any_order_and_only_what_is_there() -> None:
-    found = body("<inertia>1 1 1 0 0 0</inertia><mass> 2 </mass>").model.body_set.objects[0]
-    assert found.mass == 2.0
-    assert found.model_fields_set == {"name", "mass", "inertia"}
+    result = body("<inertia>1 1 1 0 0 0</inertia><mass> 2 </mass>").model.body_set.objects[0]
+    assert result.mass == 2.0
+    assert result.model_fields_set == {"name", "mass", "inertia"}
 
 
 def test_unclean_values_are_read_as_opensim_reads_them_and_noted() -> None:
-    found = body("<mass>1,5</mass><mass_center>0 1</mass_center>")
-    assert found.model.body_set.objects[0].mass == 1.0
-    assert kinds(found) == [("cut", "1,5"), ("too-few", "0 1")]
-    assert "<mass>1,5</mass>" in osimlite.to_text(found.model)
-    found.model.body_set.objects[0].mass = 3.0
-    assert "<mass>3</mass>" in osimlite.to_text(found.model)
+    result = body("<mass>1,5</mass><mass_center>0 1</mass_center>")
+    assert result.model.body_set.objects[0].mass == 1.0
+    assert kinds(result) == [("cut", "1,5"), ("too-few", "0 1")]
+    assert "<mass>1,5</mass>" in osimlite.to_text(result.model)
+    result.model.body_set.objects[0].mass = 3.0
+    assert "<mass>3</mass>" in osimlite.to_text(result.model)
 
 
 def test_unknown_elements_are_noted_kept_and_written_back() -> None:
-    found = body("<mas>5</mas><mass>1</mass>")
-    assert kinds(found) == [("unknown-tag", "mas")]
-    text = osimlite.to_text(found.model)
+    result = body("<mas>5</mas><mass>1</mass>")
+    assert kinds(result) == [("unknown-tag", "mas")]
+    text = osimlite.to_text(result.model)
     assert "<mas>5</mas>" in text
-    assert osimlite.read_text(text) == found.model
+    assert osimlite.read_text(text) == result.model
 
 
 def test_unknown_classes_in_a_set_keep_their_place_and_name() -> None:
-    found = document(
+    result = document(
         "<ForceSet><objects><CoordinateLimitForce name='a'/><PlugIn name='p'><x>1</x></PlugIn>"
         "<CoordinateLimitForce name='c'/></objects></ForceSet>"
     )
-    assert kinds(found) == [("unknown-class", "PlugIn")]
-    plug_in = found.model.find("/forceset/p")
+    assert kinds(result) == [("unknown-class", "PlugIn")]
+    plug_in = result.model.find("/forceset/p")
     assert isinstance(plug_in, Unknown) and plug_in.class_name == "PlugIn"
-    text = osimlite.to_text(found.model)
+    text = osimlite.to_text(result.model)
     assert text.index('name="a"') < text.index("<x>1</x>") < text.index('name="c"')
-    assert osimlite.read_text(text) == found.model
+    assert osimlite.read_text(text) == result.model
 
 
 def test_wrong_class_duplicates_attributes() -> None:
-    found = document(
+    result = document(
         '<ForceSet><objects><Body name="b"/></objects></ForceSet><gravity>0 -1 0</gravity><gravity>0 -2 0</gravity>'
         '<BodySet colour="red"/>'
     )
-    assert kinds(found) == [("wrong-class", "Body"), ("unknown-attribute", "colour"), ("duplicate-tag", "gravity")]
-    assert found.model.gravity == (0.0, -1.0, 0.0)
+    assert kinds(result) == [("wrong-class", "Body"), ("unknown-attribute", "colour"), ("duplicate-tag", "gravity")]
+    assert result.model.gravity == (0.0, -1.0, 0.0)
 
 
 def test_named_objects_in_all_three_spellings() -> None:
@@ -103,9 +103,9 @@ def test_named_objects_in_all_three_spellings() -> None:
     long = "<frame_geometry><FrameGeometry><display_radius>1</display_radius></FrameGeometry></frame_geometry>"
     bare = "<FrameGeometry><display_radius>1</display_radius></FrameGeometry>"
     for spelling in (short, long, bare):
-        found = body(spelling)
-        assert found.model.body_set.objects[0].frame_geometry.display_radius == 1.0, spelling
-        assert not found.notes
+        result = body(spelling)
+        assert result.model.body_set.objects[0].frame_geometry.display_radius == 1.0, spelling
+        assert not result.notes
 
 
 def test_comments_of_people_stay_where_they_were() -> None:

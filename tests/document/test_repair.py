@@ -57,30 +57,30 @@ def document(text: str | bytes) -> Document:
     ],
 )
 def test_read_with_a_note(old: str, new: str, kind: str, line: int) -> None:
-    found = document(TEXT.replace(old, new, 1))
-    assert [(note.kind, note.line) for note in found.notes if note.word != "side"] == [(kind, line)]
-    assert found.fault is not None
-    thigh = found.model["/bodyset/thigh"]
+    result = document(TEXT.replace(old, new, 1))
+    assert [(note.kind, note.line) for note in result.notes if note.word != "side"] == [(kind, line)]
+    assert result.fault is not None
+    thigh = result.model["/bodyset/thigh"]
     assert thigh.mass == 8
     # Positions are those of the text as it is.
-    source = found.source
+    source = result.source
     assert source.lines[source.of_tag(thigh._index).line - 1].startswith("<Body")
     mass = source.child(thigh._index, "mass")
     assert mass is not None
     assert source.lines[source.of_tag(mass).line - 1].endswith("<mass>8</mass>")
     # What is written is XML.
-    assert not [note for note in read_document(Source(to_text(found.model).encode())).notes if note.word != "side"]
+    assert not [note for note in read_document(Source(to_text(result.model).encode())).notes if note.word != "side"]
 
 
 def test_well_formed_text_has_no_fault() -> None:
-    found = document(TEXT)
-    assert (found.notes, found.fault) == ([], None)
+    result = document(TEXT)
+    assert (result.notes, result.fault) == ([], None)
 
 
 def test_everything_at_once() -> None:
     text = TEXT.replace("Anna", "A & B &copy; C &amp; D").replace("<mass>", "<!-- a -- b -- c --><mass>")
-    found = document("notes:\n" + text.replace('name="thigh"', "name='a' name = \"thigh\"") + "bye")
-    kinds = [note.kind for note in found.notes]
+    result = document("notes:\n" + text.replace('name="thigh"', "name='a' name = \"thigh\"") + "bye")
+    kinds = [note.kind for note in result.notes]
     assert kinds == [
         "text-outside-root",
         "bare-ampersand",
@@ -89,25 +89,30 @@ def test_everything_at_once() -> None:
         "hyphens-in-comment",
         "text-outside-root",
     ]
-    assert found.model.credits == "A & B \u00a9 C & D"
-    assert [found.source.spans[note.number].tag for note in found.notes[1:5]] == ["credits", "credits", "Body", "Body"]
+    assert result.model.credits == "A & B \u00a9 C & D"
+    assert [result.source.spans[note.number].tag for note in result.notes[1:5]] == [
+        "credits",
+        "credits",
+        "Body",
+        "Body",
+    ]
 
 
 def test_the_last_of_two_attributes_counts_as_for_opensim() -> None:
-    found = document(TEXT.replace('<Body name="thigh">', '<Body name="a" name="b" name="thigh">'))
-    assert found.model["/bodyset/thigh"].mass == 8
-    assert [note.word for note in found.notes] == ["name", "name"]
+    result = document(TEXT.replace('<Body name="thigh">', '<Body name="a" name="b" name="thigh">'))
+    assert result.model["/bodyset/thigh"].mass == 8
+    assert [note.word for note in result.notes] == ["name", "name"]
 
 
 def test_a_comment_with_hyphens_looks_the_same() -> None:
-    found = document(TEXT.replace("<mass>", "<!---- hand-made ---->\n<mass>"))
-    assert "<!--\u2013\u2013 hand-made \u2013\u2013-->" in to_text(found.model)
+    result = document(TEXT.replace("<mass>", "<!---- hand-made ---->\n<mass>"))
+    assert "<!--\u2013\u2013 hand-made \u2013\u2013-->" in to_text(result.model)
 
 
 @pytest.mark.parametrize("reference", ["&lt;", "&#65;", "&#x42;", "&amp;", "&quot;"])
 def test_references_of_xml_are_left_alone(reference: str) -> None:
-    found = document(TEXT.replace("Anna", f"Anna {reference} & Bert"))
-    assert [note.word for note in found.notes] == ["&"]
+    result = document(TEXT.replace("Anna", f"Anna {reference} & Bert"))
+    assert [note.word for note in result.notes] == ["&"]
 
 
 def test_references_of_html_make_no_markup() -> None:
@@ -192,17 +197,17 @@ def test_half_a_character_at_the_end_stands_for_one_that_is_missing() -> None:
 
 @pytest.mark.parametrize("cut", range(0, len(TEXT), 7))
 def test_a_text_that_breaks_off_is_surveyed_as_far_as_it_goes(cut: int) -> None:
-    found = survey(Source(TEXT[:cut].encode()))
-    assert found.faults
-    assert all(fault.line is not None for fault in found.faults)
+    result = survey(Source(TEXT[:cut].encode()))
+    assert result.faults
+    assert all(fault.line is not None for fault in result.faults)
 
 
 def test_what_is_recovered_of_an_old_document_is_upgraded() -> None:
     old = '<OpenSimDocument Version="30000"><Model name="m"><ForceSet><objects><CoordinateActuator name="c">'
-    found = survey(Source((old + "<isDisabled>true</isDisabled></CoordinateActuator></objects>").encode()))
-    assert found.document is not None
-    assert found.document.model["/forceset/c"].appliesForce is False
-    assert found.document.notes == []
+    result = survey(Source((old + "<isDisabled>true</isDisabled></CoordinateActuator></objects>").encode()))
+    assert result.document is not None
+    assert result.document.model["/forceset/c"].appliesForce is False
+    assert result.document.notes == []
 
 
 # Nothing hangs on any text

@@ -76,12 +76,12 @@ def test_walks_are_the_converged_ones(
     rest = {name: 0.0 for name in data.names if name not in known and any(m.name == name for m in human.components())}
     converged = np.load(reference / case / "converged.npz")
     times = converged["t"]
-    found = osimlite.inverse_kinematics(
+    result = osimlite.inverse_kinematics(
         human, data, weights=known | rest, coordinates=goals, start=times[0], end=times[-1]
     )
-    assert list(found.coordinates) == converged["names"].tolist()
-    assert found.values == pytest.approx(converged["q_si"], abs=2e-9)
-    assert not found.unsettled and found.steps.mean() < 5.0
+    assert list(result.coordinates) == converged["names"].tolist()
+    assert result.values == pytest.approx(converged["q_si"], abs=2e-9)
+    assert not result.unsettled and result.steps.mean() < 5.0
 
 
 def test_files_and_arrays_are_the_same(tmp_path: Path) -> None:
@@ -90,17 +90,17 @@ def test_files_and_arrays_are_the_same(tmp_path: Path) -> None:
     places = positions(values)
     times = np.linspace(0.0, 1.0, len(values)).tolist()
     model = free_body()
-    found = [osimlite.inverse_kinematics(model, as_arrays(places), times=times)]
+    results = [osimlite.inverse_kinematics(model, as_arrays(places), times=times)]
     for unit, factor in (("m", 1.0), ("mm", 1000.0)):
         path = tmp_path / f"{unit}.trc"
         write_trc(path, times, MARKERS, (factor * places).reshape(len(values), -1).tolist(), units=unit)
-        found.append(osimlite.inverse_kinematics(model, path))
-    for result in found:
+        results.append(osimlite.inverse_kinematics(model, path))
+    for result in results:
         assert result.values == pytest.approx(values, abs=1e-8)
         assert result.marker_errors == pytest.approx(np.zeros((len(values), 4)), abs=1e-9)
-    frame = found[0].to_frame()
-    assert list(frame.columns) == list(found[0].coordinates) and len(frame) == len(values)
-    assert found[0].to_xarray()["marker_error"].shape == (len(values), 4)
+    frame = results[0].to_frame()
+    assert list(frame.columns) == list(results[0].coordinates) and len(frame) == len(values)
+    assert results[0].to_xarray()["marker_error"].shape == (len(values), 4)
 
 
 def test_the_frame_solver_finds_the_same_poses() -> None:
@@ -125,24 +125,24 @@ def test_a_gap_is_bridged_by_what_is_seen() -> None:
     values = motion()
     places = positions(values)
     places[5:9, 2] = np.nan
-    found = osimlite.inverse_kinematics(free_body(), as_arrays(places))
-    assert found.values == pytest.approx(values, abs=1e-8)
-    assert np.isnan(found.marker_errors[5:9, 2]).all()
-    assert found.summary["partly_unseen"] == {"three": 0.2}
+    result = osimlite.inverse_kinematics(free_body(), as_arrays(places))
+    assert result.values == pytest.approx(values, abs=1e-8)
+    assert np.isnan(result.marker_errors[5:9, 2]).all()
+    assert result.summary["partly_unseen"] == {"three": 0.2}
     swapped = positions(values)
     swapped[10, [0, 1]] = swapped[10, [1, 0]]
-    found = osimlite.inverse_kinematics(free_body(), as_arrays(swapped))
-    assert found.summary["worst_time"] == 10.0
-    assert np.delete(found.values, 10, 0) == pytest.approx(np.delete(values, 10, 0), abs=1e-7)
+    result = osimlite.inverse_kinematics(free_body(), as_arrays(swapped))
+    assert result.summary["worst_time"] == 10.0
+    assert np.delete(result.values, 10, 0) == pytest.approx(np.delete(values, 10, 0), abs=1e-7)
 
 
 def test_weights_count() -> None:
     """A marker of weight 0 is reported and does not pull."""
     places = positions(motion(3))
     places[:, 3] += 1.0
-    found = osimlite.inverse_kinematics(free_body(), as_arrays(places), weights={"four": 0.0})
-    assert found.values == pytest.approx(motion(3), abs=1e-8)
-    assert found.marker_errors[:, 3] == pytest.approx(np.full(3, np.sqrt(3.0)), abs=1e-8)
+    result = osimlite.inverse_kinematics(free_body(), as_arrays(places), weights={"four": 0.0})
+    assert result.values == pytest.approx(motion(3), abs=1e-8)
+    assert result.marker_errors[:, 3] == pytest.approx(np.full(3, np.sqrt(3.0)), abs=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -189,9 +189,9 @@ def test_what_cannot_be_fitted_is_told() -> None:
 def test_one_marker_at_ten_hertz_is_followed() -> None:
     """The pose moves no further than the marker asks for."""
     places = positions(motion(10))
-    found = osimlite.inverse_kinematics(free_body(), {"one": places[:, 0]})
-    assert found.marker_errors.max() < 1e-7
-    assert np.abs(np.diff(found.values, axis=0)).max() < 1.0
+    result = osimlite.inverse_kinematics(free_body(), {"one": places[:, 0]})
+    assert result.marker_errors.max() < 1e-7
+    assert np.abs(np.diff(result.values, axis=0)).max() < 1.0
 
 
 def test_markers_of_a_table(tmp_path: Path) -> None:

@@ -51,14 +51,14 @@ def person(seed: int, noise: float = 0.0, frames: int = 60) -> tuple[dict[str, A
     mechanism = osimlite.mechanism(model)
     moments, rate = np.arange(frames) / frames, rng.uniform(1.0, 6.0, len(mechanism.coordinates))
     stations = marker_stations(model, mechanism)
-    found: dict[str, list[Any]] = {name: [] for name in stations}
+    result: dict[str, list[Any]] = {name: [] for name in stations}
     for t in moments:
         q = 0.5 * np.sin(rate * (t + 0.2))
         q[mechanism.coordinate_index("platform_rz")] = 0.0
         state = mechanism.at(q)
         for name, place in stations.items():
-            found[name].append(state.point(*place) + rng.normal(0.0, noise, 3))
-    return {name: np.array(rows) for name, rows in found.items()}, offsets
+            result[name].append(state.point(*place) + rng.normal(0.0, noise, 3))
+    return {name: np.array(rows) for name, rows in result.items()}, offsets
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -67,17 +67,17 @@ def test_somebody_is_found_again(seed: int) -> None:
     data, offsets = person(seed, 0.005, 200)
     model = marked()
     text = osimlite.to_text(model)
-    found = osimlite.fit(model, {"moving": data}, held=HELD)
+    result = osimlite.fit(model, {"moving": data}, held=HELD)
     assert osimlite.to_text(model) == text
     for body, size in SIZES.items():
-        assert found.factors[body] == pytest.approx([size] * 3, rel=0.01), body
-        assert abs(found.factors[body][0] - size) < 4.0 * found.uncertain[body][0]
-    assert {*found.offsets} == {*offsets}
+        assert result.factors[body] == pytest.approx([size] * 3, rel=0.01), body
+        assert abs(result.factors[body][0] - size) < 4.0 * result.uncertain[body][0]
+    assert {*result.offsets} == {*offsets}
     for name, by in offsets.items():
-        assert np.linalg.norm(found.offsets[name] - by) < 0.003, name
-    error = found.errors(found.after)["moving"]
-    assert 0.007 < error < 0.005 * np.sqrt(3.0) and found.errors(found.before)["moving"] > 2.0 * error
-    motion = osimlite.inverse_kinematics(found.model, data)
+        assert np.linalg.norm(result.offsets[name] - by) < 0.003, name
+    error = result.errors(result.after)["moving"]
+    assert 0.007 < error < 0.005 * np.sqrt(3.0) and result.errors(result.before)["moving"] > 2.0 * error
+    motion = osimlite.inverse_kinematics(result.model, data)
     assert motion.summary["rms_marker_error"] == pytest.approx(error, rel=1e-3)
 
 
@@ -98,11 +98,11 @@ def test_a_marker_that_was_taken_for_another_is_left_out() -> None:
     data, _ = person(7, 0.002)
     one, two = "LeftShank_upper", "RightShank_upper"
     data[one][10:13], data[two][10:13] = data[two][10:13] + 0.3, data[one][10:13] - 0.3
-    found = fit(marked(), {"walk": data}, held=HELD)
-    assert {note.split(" is left out in ")[0] for note in found.notes} == {one, two}
-    assert all("in 3 frames of walk" in note for note in found.notes)
-    assert np.isnan(found.measured[10:13, found.markers.index(one)]).all()
-    assert found.factors["LeftShank"][0] == pytest.approx(0.93, rel=0.01)
+    result = fit(marked(), {"walk": data}, held=HELD)
+    assert {note.split(" is left out in ")[0] for note in result.notes} == {one, two}
+    assert all("in 3 frames of walk" in note for note in result.notes)
+    assert np.isnan(result.measured[10:13, result.markers.index(one)]).all()
+    assert result.factors["LeftShank"][0] == pytest.approx(0.93, rel=0.01)
 
 
 def test_factors_move_markers_as_the_difference_of_two_models_says() -> None:
@@ -154,8 +154,8 @@ def test_the_setup_makes_the_same_model(tmp_path: Path) -> None:
     data, _ = person(2)
     model = marked()
     osimlite.write(model, tmp_path / "generic.osim")
-    found = fit(model, {"moving": data}, held=HELD, mass=70.0)
-    texts = person_texts(found, tmp_path / "generic.osim", tmp_path / "subject", 70.0)
+    result = fit(model, {"moving": data}, held=HELD, mass=70.0)
+    texts = person_texts(result, tmp_path / "generic.osim", tmp_path / "subject", 70.0)
     (tmp_path / "subject").mkdir()
     for name, text in texts.items():
         (tmp_path / "subject" / name).write_text(text)
@@ -191,9 +191,9 @@ def test_markers_that_stand_still_are_no_reason_to_fail() -> None:
     """All frozen: the sizes are what the distances say, within what is likely."""
     data, _ = person(1)
     frozen = {name: np.tile(rows[0], (20, 1)) for name, rows in data.items()}
-    found = fit(marked(), {"still": frozen}, held=HELD)
-    assert found.errors(found.after)["still"] < 0.01
-    assert max(max(own) for own in found.factors.values()) < 1.6
+    result = fit(marked(), {"still": frozen}, held=HELD)
+    assert result.errors(result.after)["still"] < 0.01
+    assert max(max(own) for own in result.factors.values()) < 1.6
 
 
 def test_bodies_that_are_fixed_to_ground_and_poses_that_are_given() -> None:
@@ -217,9 +217,9 @@ def test_bodies_that_are_fixed_to_ground_and_poses_that_are_given() -> None:
     places = [1.2 * np.array([*mechanism.station_positions([0.1 * k]).values()]) for k in range(10)]
     names = [path.rpartition("/")[2] for path in mechanism.station_positions([0.0])]
     data = {name: np.array([row[k] for row in places]) for k, name in enumerate(names)}
-    found = fit(model, {"turning": data})
-    assert found.factors["post"] == pytest.approx([1.2] * 3, rel=1e-3)
-    assert found.factors["arm"] == pytest.approx([1.2] * 3, rel=1e-3)
+    result = fit(model, {"turning": data})
+    assert result.factors["post"] == pytest.approx([1.2] * 3, rel=1e-3)
+    assert result.factors["arm"] == pytest.approx([1.2] * 3, rel=1e-3)
     (coordinate,) = model.components(osimlite.Coordinate)
     coordinate.locked = True
     assert fit(model, {"still": {name: rows[:1] for name, rows in data.items()}}).factors["arm"][0] > 1.19

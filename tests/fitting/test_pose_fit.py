@@ -188,8 +188,8 @@ def test_python_and_machine_code_find_the_same_poses() -> None:
     rng = np.random.default_rng(2)
     motion = [places_at(case, markers, 0.3 * np.sin(0.1 * t + np.arange(6))) for t in range(4)]
     frames = np.array(motion).reshape(4, -1) + rng.normal(0.0, 0.01, (4, 3 * len(markers)))
-    found = [PoseFit(case, markers, code=code).fit(frames, q=np.zeros(6)).values for code in (COMPILED, PYTHON)]
-    assert found[0] == pytest.approx(found[1], abs=1e-10)
+    result = [PoseFit(case, markers, code=code).fit(frames, q=np.zeros(6)).values for code in (COMPILED, PYTHON)]
+    assert result[0] == pytest.approx(result[1], abs=1e-10)
 
 
 def _free_body() -> Mechanism:
@@ -325,10 +325,10 @@ def test_markers_and_sensors_count_as_shares() -> None:
     rotations = noise @ orientations_at(mechanism, sensors, q)
     rotations[1] = np.nan
     poses = PoseFit(mechanism, markers, sensors).fit(np.concatenate([measured.ravel(), rotations.ravel()])[None], q=q)
-    found = poses.values[0]
-    turns = turns_between(rotations[[0, 2]], orientations_at(mechanism, sensors, found)[[0, 2]])
+    result = poses.values[0]
+    turns = turns_between(rotations[[0, 2]], orientations_at(mechanism, sensors, result)[[0, 2]])
     angles = np.sum(turns**2, axis=1)
-    assert poses.costs[0] == pytest.approx(cost_of(mechanism, markers, measured, found) + 0.25 * angles.sum())
+    assert poses.costs[0] == pytest.approx(cost_of(mechanism, markers, measured, result) + 0.25 * angles.sum())
     assert poses.turns[0, [0, 2]] == pytest.approx(turns, abs=1e-12) and np.isnan(poses.turns[0, 1]).all()
 
 

@@ -25,16 +25,16 @@ CASE = "oracle/tools/reference/scale_gait2354"
 
 def numbers_of(item: Object, path: str = "") -> dict[str, Any]:
     """Every value of an object and of all that it holds, by where it is."""
-    found: dict[str, Any] = {f"{path}": type(item).__name__}
+    result: dict[str, Any] = {f"{path}": type(item).__name__}
     for spec in type(item).field_specs().values():
         value = getattr(item, spec.name)
         many = value if isinstance(value, list) else [value]
         for number, one in enumerate(many):
             if isinstance(one, Object):
-                found |= numbers_of(one, f"{path}/{spec.name}[{number}]")
+                result |= numbers_of(one, f"{path}/{spec.name}[{number}]")
             else:
-                found[f"{path}/{spec.name}"] = one
-    return found
+                result[f"{path}/{spec.name}"] = one
+    return result
 
 
 def assert_same(ours: Object, theirs: Object, but: str = "/socket_frame") -> None:
@@ -85,25 +85,25 @@ def setup(shared: Path, tmp_path: Path) -> Path:
 def test_a_gait_model_is_scaled_as_opensim_scales_it(setup: Path) -> None:
     """Model and factors by meaning, and a pose of the subject that is no worse than OpenSim's."""
     tool: Any = osimlite.read_document(setup / "their_scale.xml")
-    found = run_scale(tool, setup)
-    ours = osimlite.read_text(found.texts[tool.model_scaler.output_model_file])
+    result = run_scale(tool, setup)
+    ours = osimlite.read_text(result.texts[tool.model_scaler.output_model_file])
     assert_same(ours, osimlite.read(setup / "their_subject01_scaledOnly.osim"))
     theirs: Any = osimlite.read_document(setup / "their_subject01_scaleSet_applied.xml")
-    assert found.measured is not None and found.placed is not None
+    assert result.measured is not None and result.placed is not None
     for scale in theirs.objects:
         # OpenSim prints six digits of these.
-        assert found.measured.factors[scale.segment] == pytest.approx(scale.scales, rel=1e-5)
-    assert found.measured.notes[0] == "measurement 'thigh': the model has no body 'patella_r'"
-    placed = osimlite.read_text(found.texts[tool.marker_placer.output_model_file])
+        assert result.measured.factors[scale.segment] == pytest.approx(scale.scales, rel=1e-5)
+    assert result.measured.notes[0] == "measurement 'thigh': the model has no body 'patella_r'"
+    placed = osimlite.read_text(result.texts[tool.marker_placer.output_model_file])
     assert_same(placed, osimlite.read(setup / "their_subject01_simbody.osim"), but="location")
-    text = found.texts[tool.marker_placer.output_motion_file]
+    text = result.texts[tool.marker_placer.output_motion_file]
     their_text = (setup / "their_subject01_static_output.mot").read_text()
     assert text.split("\n")[:7] == their_text.split("\n")[:7]
-    assert found.placed.pose.costs[0] == pytest.approx(2.0127e-4, rel=3e-3) and not found.placed.pose.unsettled
+    assert result.placed.pose.costs[0] == pytest.approx(2.0127e-4, rel=3e-3) and not result.placed.pose.unsettled
     (setup / "pose.mot").write_text(text)
     pose, known = read_sto(setup / "pose.mot"), read_sto(setup / "their_subject01_static_output.mot")
     assert pose.columns == known.columns and pose.rows == pytest.approx(known.rows, abs=0.02)
-    assert len(found.placed.moved) > 30 and max(found.placed.moved.values()) < 0.2
+    assert len(result.placed.moved) > 30 and max(result.placed.moved.values()) < 0.2
 
 
 def body_model() -> osimlite.Model:
@@ -126,9 +126,9 @@ LENGTH = {"length": ([("top", "bottom")], {"thigh": "Y"})}
 def test_distances_of_markers_scale_bodies() -> None:
     """The mean over the frames, along the axes that are named; the model given stays as it is."""
     model = body_model()
-    found = osimlite.scale(model, STATIC, measurements=LENGTH)
-    assert found.measured is not None and found.measured.ratios == {"length": pytest.approx(0.48 / 0.4)}
-    thigh: Any = found.model["/bodyset/thigh"]
+    result = osimlite.scale(model, STATIC, measurements=LENGTH)
+    assert result.measured is not None and result.measured.ratios == {"length": pytest.approx(0.48 / 0.4)}
+    thigh: Any = result.model["/bodyset/thigh"]
     assert thigh.mass_center == pytest.approx((0.0, -0.24, 0.0)) and thigh.mass == pytest.approx(8.0 * 1.2)
     assert model["/bodyset/thigh"].mass == 8.0
     both = osimlite.scale(model, STATIC, measurements=LENGTH, factors={"thigh": (2.0, 1.0, 1.0)}, mass=5.0)
@@ -140,12 +140,12 @@ def test_markers_are_placed_where_they_were_measured() -> None:
     """In the pose that fits them; fixed ones stay."""
     model = body_model()
     model["/markerset/top"].fixed = True
-    found = osimlite.scale(model, STATIC, measurements=LENGTH, place=True)
-    assert found.placed is not None and list(found.placed.moved) == ["bottom"]
-    state = found.placed.pose.mechanism.at(found.placed.pose.values[0])
-    bottom = np.array(found.model["/markerset/bottom"].location)
+    result = osimlite.scale(model, STATIC, measurements=LENGTH, place=True)
+    assert result.placed is not None and list(result.placed.moved) == ["bottom"]
+    state = result.placed.pose.mechanism.at(result.placed.pose.values[0])
+    bottom = np.array(result.model["/markerset/bottom"].location)
     assert state.point(0, bottom) == pytest.approx((0.0, 0.52, 0.0), abs=1e-9)
-    assert found.model["/markerset/top"].location == (0.0, 0.0, 0.0)
+    assert result.model["/markerset/top"].location == (0.0, 0.0, 0.0)
 
 
 def test_inertia_of_equal_factors_is_exact() -> None:
@@ -196,5 +196,5 @@ def test_what_cannot_be_scaled_is_told() -> None:
 )
 def test_frames_of_a_range_are_those_of_opensim(first: float, last: float, frames: tuple[int, int]) -> None:
     """The last one not after the beginning to the first one not before the end."""
-    found = frames_between(np.arange(4.0), first, last)
-    assert (found.start, found.stop) == frames
+    result = frames_between(np.arange(4.0), first, last)
+    assert (result.start, result.stop) == frames

@@ -164,21 +164,21 @@ def test_orientations_are_fitted_and_translations_stay(lab: Path) -> None:
     height.default_value = 0.9
     poses, sensors, _ = measured(model)
     sensors["shank_imu"][3] = np.nan
-    found = osimlite.inverse_kinematics(model, orientations=sensors, times=np.arange(8) / 10)
-    assert found.sensors == ("thigh_imu", "shank_imu") and found.markers == ()
-    assert found.values[:, 3:6] == pytest.approx(np.tile((0.0, 0.9, 0.0), (8, 1)))
-    assert found.values[:, :3] == pytest.approx(poses[:, :3], abs=1e-8)
-    assert np.delete(found.values[:, 6], 3) == pytest.approx(np.delete(poses[:, 6], 3), abs=1e-8)
-    assert np.isnan(found.orientation_errors[3, 1]) and found.summary["partly_unseen"] == {"shank_imu": 0.125}
-    assert found.summary["rms_orientation_error"] < 1e-8 and found.summary["worst_sensor"] in found.sensors
-    assert found.to_xarray()["orientation_error"].dims == ("time", "sensor")
-    assert list(found.to_frame().columns) == list(found.coordinates)
+    result = osimlite.inverse_kinematics(model, orientations=sensors, times=np.arange(8) / 10)
+    assert result.sensors == ("thigh_imu", "shank_imu") and result.markers == ()
+    assert result.values[:, 3:6] == pytest.approx(np.tile((0.0, 0.9, 0.0), (8, 1)))
+    assert result.values[:, :3] == pytest.approx(poses[:, :3], abs=1e-8)
+    assert np.delete(result.values[:, 6], 3) == pytest.approx(np.delete(poses[:, 6], 3), abs=1e-8)
+    assert np.isnan(result.orientation_errors[3, 1]) and result.summary["partly_unseen"] == {"shank_imu": 0.125}
+    assert result.summary["rms_orientation_error"] < 1e-8 and result.summary["worst_sensor"] in result.sensors
+    assert result.to_xarray()["orientation_error"].dims == ("time", "sensor")
+    assert list(result.to_frame().columns) == list(result.coordinates)
     path = lab / "trial.sto"
     rows = np.stack([*sensors.values()], axis=1).reshape(8, -1).tolist()
     write_sto(path, "trial", (np.arange(8) / 10).tolist(), list(sensors), rows, kind="Quaternion")
     again = osimlite.inverse_kinematics(model, orientations=path, start=0.2, end=0.4)
     assert again.times == pytest.approx([0.2, 0.3, 0.4])
-    assert again.values == pytest.approx(found.values[2:5], abs=1e-7)
+    assert again.values == pytest.approx(result.values[2:5], abs=1e-7)
 
 
 def test_markers_and_orientations_are_fitted_together() -> None:
@@ -186,16 +186,16 @@ def test_markers_and_orientations_are_fitted_together() -> None:
     model = worn()
     poses, sensors, places = measured(model)
     sensors["thigh_imu"] = quaternion(turned(0.5, 0.0, 0.0) @ rotation_of(sensors["thigh_imu"]))
-    found = osimlite.inverse_kinematics(model, places, orientations=sensors, weights={"thigh_imu": 0.0})
-    assert found.values == pytest.approx(poses, abs=1e-8)
-    assert found.orientation_errors == pytest.approx(np.tile((0.5, 0.0), (8, 1)), abs=1e-8)
-    assert found.turns[:, 0] == pytest.approx(np.tile((-0.5, 0.0, 0.0), (8, 1)), abs=1e-8)
+    result = osimlite.inverse_kinematics(model, places, orientations=sensors, weights={"thigh_imu": 0.0})
+    assert result.values == pytest.approx(poses, abs=1e-8)
+    assert result.orientation_errors == pytest.approx(np.tile((0.5, 0.0), (8, 1)), abs=1e-8)
+    assert result.turns[:, 0] == pytest.approx(np.tile((-0.5, 0.0, 0.0), (8, 1)), abs=1e-8)
     solver = osimlite.FrameSolver(model, [*places], {"thigh_imu": 0.0}, sensors=[*sensors])
     for number, q in enumerate(poses):
         seen = [values[number] for values in places.values()]
         assert solver.step(seen, orientations=[one[number] for one in sensors.values()]) == pytest.approx(q, abs=1e-8)
-    assert solver.turns == pytest.approx(found.turns[-1], abs=1e-8)
-    assert solver.places == pytest.approx(found.places[-1], abs=1e-8)
+    assert solver.turns == pytest.approx(result.turns[-1], abs=1e-8)
+    assert solver.places == pytest.approx(result.places[-1], abs=1e-8)
 
 
 def test_the_frame_solver_takes_sensors_alone() -> None:
@@ -230,7 +230,7 @@ def test_what_cannot_be_fitted_is_told() -> None:
 
 def test_frames_with_many_sensors_missing_reach_their_best_pose(corpus: Any, tmp_path: Path) -> None:
     """Where poses look nearly alike and coordinates are at ends of their ranges, some hundred steps were not enough."""
-    path = next(found.converted for found in corpus if found.id == "m0954")
+    path = next(result.converted for result in corpus if result.id == "m0954")
     (tmp_path / "model.osim").write_bytes(gzip.decompress(path.read_bytes()))
     model = osimlite.read(tmp_path / "model.osim")
     place_sensors(model, OrientationData.of({f"{body.name}_imu": np.eye(3) for body in model.body_set.objects}))
@@ -250,8 +250,8 @@ def test_frames_with_many_sensors_missing_reach_their_best_pose(corpus: Any, tmp
         )
     values = np.array(rows)
     values[(rng.random(frames) < 0.3)[:, None] & (rng.random(values.shape[:2]) < 0.2)] = np.nan
-    found = osimlite.inverse_kinematics(model, orientations=dict(zip(names, np.swapaxes(values, 0, 1), strict=True)))
-    assert not found.unsettled and found.steps.max() < 120
+    result = osimlite.inverse_kinematics(model, orientations=dict(zip(names, np.swapaxes(values, 0, 1), strict=True)))
+    assert not result.unsettled and result.steps.max() < 120
 
 
 TRACKER = """<OpenSimDocument Version="40600">

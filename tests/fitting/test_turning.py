@@ -76,9 +76,9 @@ def test_who_turns_around_goes_on_at_the_other_end(low: float, high: float, way:
     angles = way * np.concatenate([np.arange(100.0, 760.0, 8.0), np.arange(760.0, 100.0, -30.0)])
     model = turner(low, high)
     _, _, places = trial_of(model, poses(angles))
-    found = fitted(model, places)
-    assert found.costs.max() < 1e-15 and not found.unsettled
-    facing = np.degrees(found.values[:, FACING])
+    result = fitted(model, places)
+    assert result.costs.max() < 1e-15 and not result.unsettled
+    facing = np.degrees(result.values[:, FACING])
     assert (low - 1e-9 <= facing).all() and (facing <= high + 1e-9).all()
     off = facing - angles
     assert off == pytest.approx(360.0 * np.round(off / 360.0), abs=1e-6)
@@ -86,7 +86,7 @@ def test_who_turns_around_goes_on_at_the_other_end(low: float, high: float, way:
     # Only where going on would leave the range.
     on = facing[leaps] + np.diff(angles)[leaps]
     assert ((on < low) | (on > high)).all()
-    others = np.delete(found.values, FACING, axis=1)
+    others = np.delete(result.values, FACING, axis=1)
     assert others == pytest.approx(np.delete(poses(angles), FACING, axis=1), abs=1e-8)
 
 
@@ -103,9 +103,9 @@ def test_who_turns_over_is_followed(turning: int, widest: float) -> None:
     for number, coordinate in enumerate([*model.components(osimlite.Coordinate)][:3]):
         end = float(np.radians(widest if number == 1 else 180.0))
         coordinate.clamped, coordinate.range = True, (-end, end)
-    found = fitted(model, places)
-    assert found.costs.max() < 1e-15 and not found.unsettled
-    assert found.values[:, 3:] == pytest.approx(values[:, 3:], abs=1e-7)
+    result = fitted(model, places)
+    assert result.costs.max() < 1e-15 and not result.unsettled
+    assert result.values[:, 3:] == pytest.approx(values[:, 3:], abs=1e-7)
 
 
 @pytest.mark.parametrize(("low", "high"), [(-170.0, 170.0), (-90.0, 90.0), (-180.0, 180.0)])
@@ -117,8 +117,8 @@ def test_every_frame_is_at_the_least_of_all_minima(low: float, high: float) -> N
     ends = np.radians((low, high))
     bounds = np.array([(-np.inf, np.inf)] * 7)
     bounds[FACING], bounds[6] = ends, (-2.0, 0.5)
-    found = fitted(model, places)
-    for wanted, cost in zip(places, found.costs, strict=True):
+    result = fitted(model, places)
+    for wanted, cost in zip(places, result.costs, strict=True):
 
         def residuals(q: Any, wanted: Any = wanted) -> Any:
             state = mechanism.at(q)

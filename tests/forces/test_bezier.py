@@ -17,26 +17,26 @@ MORE = {"force_velocity_inverse": lambda *numbers: muscle_curves.force_velocity(
 
 
 def curves(fixtures):
-    for found in json.loads(gzip.decompress((fixtures / "muscles" / "curves.json.gz").read_bytes())):
-        if found["curve"].endswith("Curve"):
-            name = module_name(found["curve"].removesuffix("Curve"))
+    for result in json.loads(gzip.decompress((fixtures / "muscles" / "curves.json.gz").read_bytes())):
+        if result["curve"].endswith("Curve"):
+            name = module_name(result["curve"].removesuffix("Curve"))
             make = MORE.get(name) or getattr(muscle_curves, name)
-            yield found, make(*[value for key, value in found["params"].items() if key != "fitted"])
+            yield result, make(*[value for key, value in result["params"].items() if key != "fitted"])
 
 
 def test_values_slopes_and_integrals(fixtures):
-    for found, numbers in curves(fixtures):
+    for result, numbers in curves(fixtures):
         whole = curve_integral(numbers, numbers[LAST])
-        for place, x in enumerate(found["x"]):
+        for index, x in enumerate(result["x"]):
             y, slope = curve_value(numbers, x)
-            assert y == pytest.approx(found["y"][place], rel=1e-12, abs=1e-13)
-            if found["dy"]:
-                assert slope == pytest.approx(found["dy"][place], rel=1e-11, abs=1e-11)
-            if found["integral"]:
+            assert y == pytest.approx(result["y"][index], rel=1e-12, abs=1e-13)
+            if result["dy"]:
+                assert slope == pytest.approx(result["dy"][index], rel=1e-11, abs=1e-11)
+            if result["integral"]:
                 # OpenSim's is a spline, worst beside the ends; that of compression counts from the other end.
                 own = curve_integral(numbers, x)
-                own = whole - own if "Compressive" in found["curve"] else own
-                assert own == pytest.approx(found["integral"][place], abs=2e-5)
+                own = whole - own if "Compressive" in result["curve"] else own
+                assert own == pytest.approx(result["integral"][index], abs=2e-5)
 
 
 share = st.floats(0.0, 1.0)

@@ -52,12 +52,12 @@ def test_two_round_ellipsoids_are_spheres(r1, r2, x, y, z, a):
     # Squares of such numbers have few digits.
     assume(max(map(abs, (x, y, z))) > 1e-140)
     sphere = sphere_sphere(ZERO, r1, (x, y, z), r2, a)
-    found = ellipsoid_ellipsoid(ZERO, IDENTITY, (r1, r1, r1), (x, y, z), IDENTITY, (r2, r2, r2), a)
+    result = ellipsoid_ellipsoid(ZERO, IDENTITY, (r1, r1, r1), (x, y, z), IDENTITY, (r2, r2, r2), a)
     if sphere[0] > 1e-9:
-        for one, other in zip(found, sphere, strict=True):
+        for one, other in zip(result, sphere, strict=True):
             assert one == pytest.approx(other, rel=1e-9, abs=1e-12)
     elif sphere[0] < -1e-9:
-        assert found[0] < 0.0
+        assert result[0] < 0.0
 
 
 def test_ellipsoids_end_to_end():

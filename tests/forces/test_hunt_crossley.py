@@ -74,18 +74,18 @@ def test_table_forces_and_energies(table):
     assert len(table) == 2232
     touching = 0
     for row in table:
-        found, energy = evaluate(row)
+        result, energy = evaluate(row)
         names = [kind + axis for kind in ("F2", "M2", "F1", "M1") for axis in "xyz"]
         expected = np.array([row[name] for name in names])
         if row["PE"] == 0.0:
             assert energy == 0.0
-            assert not found.any() and not expected.any()
+            assert not result.any() and not expected.any()
             continue
         touching += 1
         assert energy == pytest.approx(row["PE"], rel=1e-9, abs=0.0)
         for vector in (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)):
             scale = np.abs(expected[vector]).max()
-            assert np.abs(found[vector] - expected[vector]).max() <= 1e-9 * scale
+            assert np.abs(result[vector] - expected[vector]).max() <= 1e-9 * scale
     assert touching > 1500
 
 

@@ -38,17 +38,17 @@ def laws():
     for kind in (kind for kind in kinds() if isinstance(kind, Kind)):
         own = kind.law, kind.equilibrium, *kind.geometry.calls
         pending += [law for law in own if law is not None]
-    found = set()
+    result = set()
     while pending:
         function = pending.pop()
-        if function not in found:
-            found.add(function)
+        if function not in result:
+            result.add(function)
             pending += [
                 value
                 for value in globals_of(function).values()
                 if inspect.isfunction(value) and value.__module__.startswith("osimlite.")
             ]
-    return sorted(filter(is_of_forces, found), key=lambda law: (law.__module__, law.__name__))
+    return sorted(filter(is_of_forces, result), key=lambda law: (law.__module__, law.__name__))
 
 
 LAWS = [pytest.param(law, id=f"{law.__module__.rpartition('.')[2]}.{law.__name__}") for law in laws()]

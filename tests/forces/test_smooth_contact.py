@@ -22,10 +22,10 @@ def test_sharp_limit_is_hunt_crossley(d, R, v):
     E, c, us, ud, uv, vt = 1e5, 0.5, 0.8, 0.4, 0.1, 0.2
     k, *_ = combine_materials(E, c, us, ud, uv, E, c, us, ud, uv)
     hertz = smooth_hertz(d, R, E, *SHARP)
-    found = smooth_contact_force(hertz, c, us, ud, uv, vt, *SHARP, UP, v)
+    result = smooth_contact_force(hertz, c, us, ud, uv, vt, *SHARP, UP, v)
     expected = contact_force(d, R, k, c, us, ud, uv, vt, UP, v)
     size = max(map(abs, expected))
-    assert np.abs(np.subtract(found, expected)).max() <= 1e-6 * size + 1e-9
+    assert np.abs(np.subtract(result, expected)).max() <= 1e-6 * size + 1e-9
     assert smooth_contact_energy(hertz, d) == pytest.approx(contact_energy(d, R, k), rel=1e-9)
 
 

@@ -66,9 +66,9 @@ def test_a_walker_comes_back_as_the_derivative_says(steady):
     y, expected = (cycle.state + step_map.basis @ away)[None], away
     for _ in range(8):
         y, expected = step_map(y).states, slope @ expected
-        found = step_map.reduce(y[0]) - step_map.reduce(cycle.state)
+        result = step_map.reduce(y[0]) - step_map.reduce(cycle.state)
         # The push grows a hundredfold before it dies away, and may pass near zero on the way.
-        assert np.linalg.norm(found - expected) < 0.01 * np.linalg.norm(expected) + 0.1 * np.linalg.norm(away)
+        assert np.linalg.norm(result - expected) < 0.01 * np.linalg.norm(expected) + 0.1 * np.linalg.norm(away)
 
 
 def test_neutral_directions_are_the_slope_and_the_turn_of_the_pelvis(steady):

@@ -34,9 +34,9 @@ def places_of(walker, *names: str) -> list[int]:
 
 
 def test_the_pelvis_carries_the_walker(walker):
-    found = carriers(walker, find_footing(walker))
+    result = carriers(walker, find_footing(walker))
     forward, up = places_of(walker, "Pelvis_tx", "Pelvis_ty")
-    assert found.places == (forward, up) and found.lift == up
+    assert result.places == (forward, up) and result.lift == up
 
 
 @pytest.mark.parametrize("slope", [None, 2.0, 25.0])

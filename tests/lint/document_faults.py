@@ -21,12 +21,12 @@ def _document(project: Project, draw: random.Random) -> tuple[str, Text]:
 
 def leaf_like(project: Project, draw: random.Random, wanted: Callable[[str], bool]) -> tuple[str, Text, Element] | None:
     name, text = _document(project, draw)
-    found = {
+    result = {
         tag: kept
         for tag, leaves in text.leaves.items()
         if (kept := [e for e in leaves if wanted(text.inside(e).strip())])
     }
-    return (name, text, text.any(draw, found)) if found else None
+    return (name, text, text.any(draw, result)) if result else None
 
 
 def _put(
@@ -57,23 +57,23 @@ def _reference(project: Project, draw: random.Random) -> tuple[str, Text, int, i
     """A word of a document that names something in the model or in a table."""
     name, text = _document(project, draw)
     known = set(project.names)
-    found: dict[str, list[tuple[int, int]]] = {}
+    result: dict[str, list[tuple[int, int]]] = {}
     for tag, leaves in text.leaves.items():
         for leaf in leaves:
             for word in _WORD.finditer(text.inside(leaf)):
                 if word[0] in known or (word[0].startswith("/") and word[0].rpartition("/")[2] in known):
-                    found.setdefault(tag, []).append((leaf.head + word.start(), leaf.head + word.end()))
+                    result.setdefault(tag, []).append((leaf.head + word.start(), leaf.head + word.end()))
     for tag in _NAMES_SOMETHING:
         for element in text.named.get(tag, ()):
             match = re.search(r'name="([^"]+)"', text.head(element))
             assert match is not None
             if re.search(r"<apply>\s*false", text.whole(element)):
                 continue
-            found.setdefault(tag, []).append((element.start + match.start(1), element.start + match.end(1)))
-    if not found:
+            result.setdefault(tag, []).append((element.start + match.start(1), element.start + match.end(1)))
+    if not result:
         return None
-    tag = draw.choice(sorted(found))
-    start, end = draw.choice(found[tag])
+    tag = draw.choice(sorted(result))
+    start, end = draw.choice(result[tag])
     return name, text, start, end, text.text[start:end], tag
 
 
@@ -165,12 +165,12 @@ def count_of_numbers(project: Project, draw: random.Random) -> Change | None:
 def times(project: Project, draw: random.Random) -> Change | None:
     """Times that are reversed, outside the data, none at all."""
     name, text = _document(project, draw)
-    found: dict[str, list[Element]] = {
+    result: dict[str, list[Element]] = {
         tag: text.leaves[tag] for tag in ("time_range", "initial_time", "final_time") if tag in text.leaves
     }
-    if not found:
+    if not result:
         return None
-    leaf = text.any(draw, found)
+    leaf = text.any(draw, result)
     words = text.inside(leaf).split()
     if len(words) == 2:
         new = draw.choice(
@@ -181,7 +181,7 @@ def times(project: Project, draw: random.Random) -> Change | None:
         name, text, leaf, draw.choice(["NaN", {"initial_time": "60", "final_time": "-60"}[leaf.tag]]), sure=True
     )
     # It takes two to be in the wrong order.
-    both = [text.text.count("\n", 0, other.head) + 1 for other in (leaf, *text.siblings(leaf)) if other.tag in found]
+    both = [text.text.count("\n", 0, other.head) + 1 for other in (leaf, *text.siblings(leaf)) if other.tag in result]
     return change._replace(lines=tuple(both))
 
 

@@ -83,12 +83,12 @@ class Project:
 
     def users(self, file: str) -> dict[str, int]:
         """Every document that names a file, or names one that names it, with the line."""
-        found: dict[str, int] = {}
+        result: dict[str, int] = {}
         for name, document in self.documents.items():
             for line, text in enumerate(document.text.split("\n"), 1):
                 if name != file and re.search(rf"[>\s]{re.escape(file)}[<\s]", text):
-                    found |= {name: line, **{user: at for user, at in self.users(name).items() if user not in found}}
-        return found
+                    result |= {name: line, **{user: at for user, at in self.users(name).items() if user not in result}}
+        return result
 
     def places_of(self, word: str) -> set[Place]:
         """Every line of a document that names something."""

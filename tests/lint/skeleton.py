@@ -45,18 +45,18 @@ def _found(text: str, wrapped: Source, number: int) -> int | None:
     """The element of a text that has the tag and name of another."""
     span = wrapped.spans[number]
     name = re.search(r'\sname="[^"]*"', wrapped.text[span.start : span.tag_end])
-    for found, other in enumerate(Source(text.encode()).spans):
+    for result, other in enumerate(Source(text.encode()).spans):
         if other.tag == span.tag and (name is None or name[0] in text[other.start : other.tag_end]):
-            return found
+            return result
     return None
 
 
 def _placed(text: str, wrapped: Source, number: int, end: int) -> str:
     tag, element = wrapped.spans[number].tag, wrapped.text[wrapped.spans[number].start : end]
     source = Source(text.encode())
-    found = _found(text, wrapped, number)
-    if found is not None:
-        return text[: source.spans[found].start] + element + text[source.spans[found].end :]
+    result = _found(text, wrapped, number)
+    if result is not None:
+        return text[: source.spans[result].start] + element + text[source.spans[result].end :]
     holder = set_for(class_for(tag))
     if holder is None:
         return _at_the_end(text, element)
@@ -73,10 +73,10 @@ def _placed(text: str, wrapped: Source, number: int, end: int) -> str:
 def _within(text: str, wrapped: Source, number: int, child: int) -> str:
     """A text whose element that is like another has a child of that one, in place of its own with that tag."""
     source, span = Source(text.encode()), wrapped.spans[child]
-    found = _found(text, wrapped, number)
-    assert found is not None
-    before = source.child(found, span.tag)
-    start = end = source.spans[found].inner_end
+    result = _found(text, wrapped, number)
+    assert result is not None
+    before = source.child(result, span.tag)
+    start = end = source.spans[result].inner_end
     if before is not None:
         start, end = source.spans[before].start, source.spans[before].end
     return text[:start] + wrapped.text[span.start : span.end] + text[end:]

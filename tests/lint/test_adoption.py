@@ -70,8 +70,8 @@ on_bash = pytest.mark.skipif(sys.platform == "win32", reason="the action runs ba
 
 
 def steps(repo: Path) -> list[dict[str, Any]]:
-    found = yaml.safe_load((repo / "action.yml").read_text(encoding="utf-8"))["runs"]["steps"]
-    return [step for step in found if "run" in step]
+    result = yaml.safe_load((repo / "action.yml").read_text(encoding="utf-8"))["runs"]["steps"]
+    return [step for step in result if "run" in step]
 
 
 def act(repo: Path, folder: Path, paths: str, fail_on: str = "") -> subprocess.CompletedProcess[str]:
@@ -164,8 +164,8 @@ def test_the_settings_of_the_guide_are_settings(guide: str, tmp_path: Path, fixt
     settings = settings_for(tmp_path)
     walker = fixtures / "walker" / "DynamicWalkerModel.osim"
     other = settings.config_for(tmp_path / "walker.osim", Config())
-    found = [finding for finding in validate(walker, config=other) if finding.code == "OSIM508"]
-    assert [finding.severity.value for finding in found] == ["warning", "warning"]
+    result = [finding for finding in validate(walker, config=other) if finding.code == "OSIM508"]
+    assert [finding.severity.value for finding in result] == ["warning", "warning"]
     left_out = settings.config_for(tmp_path / "gait10dof.osim", Config())
     assert "OSIM508" not in validate(walker, config=left_out).codes
     assert settings.config_for(tmp_path / "archive" / "x.osim", Config()).ignore == ("OSIM701", "structure")

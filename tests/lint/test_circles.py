@@ -26,5 +26,5 @@ def test_frames_on_a_circle_are_those_that_lead_back_to_themselves(below: list[i
             here = below[here] if here < len(below) else here
             if here == start:
                 expected.add(f"f{start}")
-    found = validate(Source(text.encode()), select="OSIM411").findings
-    assert {finding.message.split("'")[1] for finding in found} == expected
+    result = validate(Source(text.encode()), select="OSIM411").findings
+    assert {finding.message.split("'")[1] for finding in result} == expected

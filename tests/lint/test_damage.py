@@ -68,10 +68,10 @@ def _lines_changed(data: bytes, draw: random.Random) -> bytes:
 
 
 def _numbers_changed(data: bytes, draw: random.Random) -> bytes:
-    found = list(re.finditer(rb"[-+]?\d[\d.]*", data[:50_000]))
-    if not found:
+    result = list(re.finditer(rb"[-+]?\d[\d.]*", data[:50_000]))
+    if not result:
         return data
-    place = draw.choice(found)
+    place = draw.choice(result)
     new = draw.choice([b"", b"1e308", b"-1e308", b"1e-320", b"nan", b"7" * 400, b"-", b".", b"1.2.3", b"1,5", b"0"])
     return data[: place.start()] + new + data[place.end() :]
 

@@ -82,8 +82,8 @@ def test_a_model_made_in_python_is_checked_too():
     model = Model(name="m")
     model.body_set.objects.append(Body(name="b", mass=1))
     model.joint_set.objects.append(ConstantCurvatureJoint(name="j"))
-    found = validate(model, config=Config(("OSIM113",), target_version="4.4"))
-    assert [each.component for each in found] == ["/jointset/j"]
+    result = validate(model, config=Config(("OSIM113",), target_version="4.4"))
+    assert [each.component for each in result] == ["/jointset/j"]
 
 
 def test_a_release_that_is_not_known_is_refused_with_those_that_are(tmp_path):

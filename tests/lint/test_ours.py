@@ -66,9 +66,9 @@ def test_a_misspelt_tool_is_told_with_the_right_name(tmp_path, tag, root):
     if root is None:
         text = "\n".join(line for line in text.split("\n") if "OpenSimDocument" not in line)
     (tmp_path / "ik.xml").write_text(text)
-    found = {(finding.line, finding.suggestion) for finding in validate(tmp_path) if finding.code == "OSIM003"}
-    assert (2 if root is None else 3, "InverseKinematicsTool") in found
-    assert root is None or ((2, "OpenSimDocument") in found) == (root != "OpenSimDocument")
+    result = {(finding.line, finding.suggestion) for finding in validate(tmp_path) if finding.code == "OSIM003"}
+    assert (2 if root is None else 3, "InverseKinematicsTool") in result
+    assert root is None or ((2, "OpenSimDocument") in result) == (root != "OpenSimDocument")
 
 
 @pytest.mark.parametrize("name", OTHERS)

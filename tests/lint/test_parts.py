@@ -29,17 +29,17 @@ OWNER = re.compile(
 @pytest.fixture
 def asked(monkeypatch):
     """The paths that are measured, each time that something is."""
-    found: list[list[str]] = []
+    results: list[list[str]] = []
     own = osimlite.measuring.measured
 
     def measured(model, **given):
         result = own(model, **given)
-        found.append(sorted(set(result.swept) - set(given["known"][1].swept if given["known"] else ())))
+        results.append(sorted(set(result.swept) - set(given["known"][1].swept if given["known"] else ())))
         return result
 
     monkeypatch.setattr(osimlite.measuring, "measured", measured)
     parts._memory.clear()
-    return found
+    return results
 
 
 @pytest.fixture(params=FILES)
@@ -62,10 +62,10 @@ def test_a_text_is_measured_once(text, asked):
 
 
 def test_what_no_path_depends_on_is_not_asked(text, asked):
-    found = told(text)
+    result = told(text)
     changed = re.sub(r"(<ContactSphere .*?<radius>)0.05", r"\g<1>0.06", text, flags=re.S)
     assert changed != text
-    assert told(changed) == found
+    assert told(changed) == result
     assert len(asked) == 1
 
 
@@ -110,7 +110,7 @@ def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch):
     path = tmp_path / "m.osim"
     (tmp_path / "osimlite.toml").write_text("")
     path.write_text(text)
-    found = check_files([str(path)], Config()).codes
+    result = check_files([str(path)], Config()).codes
     (kept,) = tmp_path.glob(".osimlite_cache/*/measured/*.json")
     subject = Subject(osimlite.document.survey.survey(Source(text.encode())))
     own = parts.parts_of(subject)
@@ -122,7 +122,7 @@ def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch):
         kept.write_text(wrong)
         assert parts.recall(own, kept.parents[1]) is None
     parts._memory.clear()
-    assert check_files([str(path)], Config()).codes == found
+    assert check_files([str(path)], Config()).codes == result
 
 
 def measures_of(text):

@@ -260,8 +260,8 @@ def test_a_baseline_of_before_the_faults_had_codes_still_counts(tmp_path):
 def test_a_group_sets_the_severity_of_its_faults():
     path = FIXTURES / "OSIM853" / "fail-02-pairs.xml"
     for word in ("OSIM853", "scale-setting"):
-        found = validate(path, config=Config(severity={word: Severity.INFO})).findings
-        assert [str(finding.severity) for finding in found] == ["info", "info"]
+        result = validate(path, config=Config(severity={word: Severity.INFO})).findings
+        assert [str(finding.severity) for finding in result] == ["info", "info"]
 
 
 def test_a_group_has_a_page_with_its_rules(capsys):

@@ -35,13 +35,13 @@ def test_settings_come_from_the_nearest_file(tmp_path):
         '[tool.osimlite.per-file-ignores]\n"old/*.osim" = ["structure"]\n'
     )
     (tmp_path / "old" / "deep").mkdir(parents=True)
-    found = settings_for(tmp_path / "old" / "deep")
-    assert found.file == tmp_path / "pyproject.toml" and found.fail_on is Severity.WARNING
-    old = found.config_for(tmp_path / "old" / "x.osim", Config(ignore=("OSIM505",)))
+    result = settings_for(tmp_path / "old" / "deep")
+    assert result.file == tmp_path / "pyproject.toml" and result.fail_on is Severity.WARNING
+    old = result.config_for(tmp_path / "old" / "x.osim", Config(ignore=("OSIM505",)))
     assert old.ignore == ("OSIM7", "structure", "OSIM505")
     assert old.mesh_paths == (str(tmp_path / "shapes"),)
-    assert found.config_for(tmp_path / "x.osim", Config()).ignore == ("OSIM7",)
-    report = validate(Source(TEXT.encode()), config=found.config_for(tmp_path / "x.osim", Config()))
+    assert result.config_for(tmp_path / "x.osim", Config()).ignore == ("OSIM7",)
+    report = validate(Source(TEXT.encode()), config=result.config_for(tmp_path / "x.osim", Config()))
     assert [(f.code, f.severity.value) for f in report] == [("OSIM505", "info"), ("OSIM101", "error")]
 
 

@@ -57,8 +57,8 @@ def test_a_fault_is_found_on_its_line(pipeline, fault):
         line = 3
     elif place:
         line = next(k for k, row in enumerate(text.split("\n"), 1) if row.lstrip().startswith(place) or place in row)
-    found = checked(pipeline / where)
-    assert (where, line) in {(file, at) for file, at, _, _ in found}, f"{where}:{line}\n{found}"
+    result = checked(pipeline / where)
+    assert (where, line) in {(file, at) for file, at, _, _ in result}, f"{where}:{line}\n{result}"
 
 
 def test_a_model_may_be_named_by_its_absolute_path(pipeline):

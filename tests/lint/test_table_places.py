@@ -98,7 +98,7 @@ def test_a_fault_is_found_in_its_line_and_column(name, good, change):
     if name == "blanks in version 3 in storage":
         text = text.replace("\t", " ")
     file = "w.sto" if good is STORAGE else "w.trc"
-    found = run(Table(text.encode(), file)).findings
-    assert [f"{finding.code} {finding.line}:{finding.column}" for finding in found] == wanted
+    result = run(Table(text.encode(), file)).findings
+    assert [f"{finding.code} {finding.line}:{finding.column}" for finding in result] == wanted
     windows = run(Table(text.replace("\n", "\r\n").encode(), file)).findings
-    assert [(finding.line, finding.column) for finding in windows] == [(one.line, one.column) for one in found]
+    assert [(finding.line, finding.column) for finding in windows] == [(one.line, one.column) for one in result]

@@ -55,8 +55,8 @@ def test_a_cell_that_is_no_number_is_found_where_it_is(draw, columns, count, wro
     rows = [[str(row / 8), *(numbers(draw).strip() for _ in range(columns))] for row in range(count)]
     row, column = draw.randrange(count), draw.randint(1, columns)
     rows[row][column] = wrong
-    found = Scan(columns + 1).run("".join("\t".join(cells) + "\n" for cells in rows).encode(), 0, 5)
-    (fault,) = found.faults.values()
+    result = Scan(columns + 1).run("".join("\t".join(cells) + "\n" for cells in rows).encode(), 0, 5)
+    (fault,) = result.faults.values()
     place = sum(map(len, rows[row][:column])) + column + 1
     assert (fault.kind, fault.number, fault.line, fault.column) == ("cell", column, row + 5, place)
 
@@ -66,8 +66,8 @@ def test_a_row_of_another_length_is_found(draw, columns, count, longer):
     rows = [[str(row / 8), *(numbers(draw).strip() for _ in range(columns))] for row in range(count)]
     row = draw.randrange(count)
     rows[row] = [*rows[row], "7"] if longer else rows[row][:-1]
-    found = Scan(columns + 1).run("".join("\t".join(cells) + "\n" for cells in rows).encode(), 0, 1)
-    (fault,) = found.faults.values()
+    result = Scan(columns + 1).run("".join("\t".join(cells) + "\n" for cells in rows).encode(), 0, 1)
+    (fault,) = result.faults.values()
     assert (fault.kind, fault.line, fault.number) == ("row", row + 1, len(rows[row]))
 
 
@@ -137,7 +137,7 @@ def test_rows_of_vectors_are_taken_many_at_a_time(monkeypatch: pytest.MonkeyPatc
         one_by_one(scan, text, line)
 
     monkeypatch.setattr(Scan, "_odd", noted)
-    found = Scan(3, 3).run("".join(lines).encode(), 0, 7)
-    assert odd == [27] and found.count == 50 and list(found.times[:2]) == [0.0, 0.1]
-    assert [(fault.kind, fault.line) for fault in found.faults.values()] == [("cell", 27)]
-    assert found.samples[1] == [0.1, 1.0, -2e-3, 1.0, 0.5, 0.25, -1.0]
+    result = Scan(3, 3).run("".join(lines).encode(), 0, 7)
+    assert odd == [27] and result.count == 50 and list(result.times[:2]) == [0.0, 0.1]
+    assert [(fault.kind, fault.line) for fault in result.faults.values()] == [("cell", 27)]
+    assert result.samples[1] == [0.1, 1.0, -2e-3, 1.0, 0.5, 0.25, -1.0]

@@ -77,8 +77,8 @@ KNEE = "/jointset/knee/knee_angle"
 )
 def test_inputs_are_followed_as_opensim_does(words, right):
     tag = "TableReporter__double_"
-    found = codes(f'<components><{tag} name="r"><input_inputs>{words}</input_inputs></{tag}></components>')
-    assert found == (set() if right else {"OSIM332"})
+    result = codes(f'<components><{tag} name="r"><input_inputs>{words}</input_inputs></{tag}></components>')
+    assert result == (set() if right else {"OSIM332"})
 
 
 def test_a_geometry_that_a_frame_draws_takes_no_input():

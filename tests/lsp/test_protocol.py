@@ -43,9 +43,9 @@ class Editor:
 
     def ask(self, method, params, number=1):
         self.send({"jsonrpc": "2.0", "id": number, "method": method, "params": params})
-        found = self.answer()
-        assert found["id"] == number
-        return found
+        result = self.answer()
+        assert result["id"] == number
+        return result
 
 
 @pytest.fixture(scope="module")
@@ -54,18 +54,18 @@ def editor(fixtures, tmp_path_factory):
     command = [sys.executable, "-m", "osimlite", "lsp"]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with log.open("wb") as stream, subprocess.Popen(command, stderr=stream, **pipes) as server:
-        found = Editor(server)
-        found.ask("initialize", {"processId": None, "rootUri": None, "capabilities": {}})
+        result = Editor(server)
+        result.ask("initialize", {"processId": None, "rootUri": None, "capabilities": {}})
         text = (fixtures / "walker" / "DynamicWalkerModel.osim").read_text()
         document = {**FILE, "languageId": "osim", "version": 1, "text": text}
-        found.send({"jsonrpc": "2.0", "method": "initialized", "params": {}})
-        found.send({"jsonrpc": "2.0", "method": "textDocument/didOpen", "params": {"textDocument": document}})
-        yield found
+        result.send({"jsonrpc": "2.0", "method": "initialized", "params": {}})
+        result.send({"jsonrpc": "2.0", "method": "textDocument/didOpen", "params": {"textDocument": document}})
+        yield result
         # After all that, it still does its work.
-        assert "result" in found.ask("textDocument/hover", {"textDocument": FILE, "position": START})
-        assert "result" in found.ask("shutdown", None)
-        found.send({"jsonrpc": "2.0", "method": "exit"})
-        assert found.server.wait(20) == 0
+        assert "result" in result.ask("textDocument/hover", {"textDocument": FILE, "position": START})
+        assert "result" in result.ask("shutdown", None)
+        result.send({"jsonrpc": "2.0", "method": "exit"})
+        assert result.server.wait(20) == 0
     assert "Traceback" not in log.read_text()
 
 
@@ -92,9 +92,9 @@ def _at(line: Any, character: Any) -> dict[str, Any]:
     ],
 )  # fmt: skip
 def test_parameters_that_are_none_are_an_error(editor, method, params):
-    found = editor.ask(f"textDocument/{method}", params)
-    assert found["error"]["code"] == PARAMETERS and "result" not in found
-    assert found["error"]["message"] and "data" not in found["error"]
+    result = editor.ask(f"textDocument/{method}", params)
+    assert result["error"]["code"] == PARAMETERS and "result" not in result
+    assert result["error"]["message"] and "data" not in result["error"]
 
 
 @pytest.mark.parametrize("number", [7, "seven"])
@@ -120,8 +120,8 @@ def test_the_answer_has_the_number_of_the_question(editor, number):
 )  # fmt: skip
 def test_what_is_no_question_is_answered_too(editor, message, number, code):
     editor.send(message)
-    found = editor.answer()
-    assert (found["id"], found["error"]["code"]) == (number, code)
+    result = editor.answer()
+    assert (result["id"], result["error"]["code"]) == (number, code)
 
 
 @pytest.mark.parametrize("method", ["textDocument/didChange", "textDocument/didClose", "$/cancelRequest"])

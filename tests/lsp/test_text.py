@@ -20,9 +20,9 @@ UNITS = st.sampled_from(list(types.PositionEncodingKind))
 def test_a_place_leads_back_to_its_offset(content: str, unit: types.PositionEncodingKind, data: st.DataObject) -> None:
     text = Text(content, unit)
     offset = data.draw(st.integers(0, len(content)))
-    found = text.offset(text.position(offset))
+    result = text.offset(text.position(offset))
     # Between the two characters of a line end there is no place.
-    assert found == offset or content[offset - 1 : offset + 1] == "\r\n"
+    assert result == offset or content[offset - 1 : offset + 1] == "\r\n"
 
 
 @given(CONTENT, CONTENT, UNITS, st.data())

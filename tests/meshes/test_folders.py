@@ -97,16 +97,16 @@ def test_files_outside_are_refused_by_name_unless_their_folder_is_named(model, l
     with pytest.raises(OutsideError, match="--geometry") as caught:
         MeshFolders(model).find(name)
     assert name in str(caught.value) and str(private) in str(caught.value)
-    found = MeshFolders(model, [private]).find(name)
-    assert found is not None and found.samefile(private / "bone.obj")
+    result = MeshFolders(model, [private]).find(name)
+    assert result is not None and result.samefile(private / "bone.obj")
 
 
 def test_names_that_lead_around_inside_are_taken(model):
     (model / "bone.obj").write_text("")
     (model / "again.obj").symlink_to("bone.obj")
     for name in (str(model / "bone.obj"), "../model/bone.obj", "again.obj", "./bone.obj"):
-        found = MeshFolders(model).find(name)
-        assert found is not None and found.samefile(model / "bone.obj")
+        result = MeshFolders(model).find(name)
+        assert result is not None and result.samefile(model / "bone.obj")
 
 
 def test_a_folder_that_is_named_may_itself_be_a_link(model):

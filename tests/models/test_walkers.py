@@ -45,5 +45,5 @@ def test_the_furthest_walker_makes_four_steps(accuracy):
     assert [step.foot for step in walk.steps] == [1, 0, 1, 0] and walk.scuffs == []
     assert (walk.ending, walk.fell_on) == ("fell", "RKneeForce")
     assert walk.distance == pytest.approx(0.5136, abs=1e-3) and walk.end == pytest.approx(1.7175, abs=1e-3)
-    standing = {engine.contacts[place]: depth for place, depth in enumerate(depths[0]) if depth > 0.0}
+    standing = {engine.contacts[index]: depth for index, depth in enumerate(depths[0]) if depth > 0.0}
     assert standing == {"RFootForce": pytest.approx(8e-4, abs=1e-5)}

@@ -91,9 +91,9 @@ def test_the_walker_in_contact_is_opensims(walker, case):
         loads[body] += records[force][:6]
     wrenches = {body: Wrench(load[:3], load[3:]) for body, load in loads.items()}
     torques = {name.replace("LimitTorque", "_rz"): record[0] for name, record in records.items() if "Limit" in name}
-    found = walker.acceleration(case["q"], case["u_with_locked_platform"], torques, wrenches)
-    _close(found, case["udot_locked_all_forces"], 1e-11)
-    assert found[0] == pytest.approx(0.0, abs=1e-30)
+    result = walker.acceleration(case["q"], case["u_with_locked_platform"], torques, wrenches)
+    _close(result, case["udot_locked_all_forces"], 1e-11)
+    assert result[0] == pytest.approx(0.0, abs=1e-30)
 
 
 def test_some_of_the_walkers_cases_are_in_contact():
@@ -138,8 +138,8 @@ def test_frames_on_frames_end_at_the_body():
     assert placed.body == 0
     assert placed.transform == pytest.approx(expected, abs=1e-15)
     assert mechanism.placement("/componentset/base").body == -1
-    found = mechanism.body_transforms({"j_0": 0.4})["b"]
-    assert found == pytest.approx(
+    result = mechanism.body_transforms({"j_0": 0.4})["b"]
+    assert result == pytest.approx(
         offset((1, 0, 0), (0, 0, 0)) @ offset((0, 0, 0), (0, 0, 0.4)) @ inverse(expected), abs=1e-15
     )
 
@@ -214,11 +214,11 @@ def test_bodies_without_a_way_to_ground_float():
     assert [info.path for info in mechanism.coordinates] == [
         "/jointset/j/j_0",
         "/jointset/k/k_0",
-        *(f"/jointset/free_{body}/free_{body}_coord_{place}" for body in "ab" for place in range(6)),
+        *(f"/jointset/free_{body}/free_{body}_coord_{index}" for body in "ab" for index in range(6)),
     ]
     carriers = {body.name: mechanism.bodies[body.parent].name if body.parent >= 0 else "" for body in mechanism.bodies}
     assert carriers == {"a": "", "b": "", "c": "b", "d": ""}
-    q = {f"free_b_coord_{place}": value for place, value in enumerate((0.1, 0.2, 0.3, 1.0, 2.0, 3.0))}
+    q = {f"free_b_coord_{index}": value for index, value in enumerate((0.1, 0.2, 0.3, 1.0, 2.0, 3.0))}
     assert mechanism.body_transforms(q)["b"] == pytest.approx(offset((1.0, 2.0, 3.0), (0.1, 0.2, 0.3)), abs=1e-15)
 
 

@@ -38,17 +38,17 @@ def test_real_models_stand_as_in_opensim(corpus_model):
     for pose in (truth["default_pose"], truth["pose2"]):
         q = np.array(pose["q"])
         for path, (position, rotation) in pose["body_xform"].items():
-            found = mechanism.frame_transform(path, q)
-            assert found[:3, 3] == pytest.approx(np.array(position), abs=near)
-            assert found[:3, :3].ravel() == pytest.approx(np.array(rotation), abs=near)
+            result = mechanism.frame_transform(path, q)
+            assert result[:3, 3] == pytest.approx(np.array(position), abs=near)
+            assert result[:3, :3].ravel() == pytest.approx(np.array(rotation), abs=near)
         stations = mechanism.station_positions(q)
         for path, position in pose["markers"].items():
             assert stations[path] == pytest.approx(np.array(position), abs=near)
         assert mechanism.center_of_mass(q) == pytest.approx(np.array(pose["com"]), abs=near)
         expected = np.array(pose.get("mass_matrix") or np.nan, dtype=float)
         if np.isfinite(expected).all():
-            found = mechanism.mass_matrix(q)[np.ix_(tree_order, tree_order)]
-            assert np.abs(found - expected).max() <= max(1e-9, near) * np.abs(expected).max()
+            result = mechanism.mass_matrix(q)[np.ix_(tree_order, tree_order)]
+            assert np.abs(result - expected).max() <= max(1e-9, near) * np.abs(expected).max()
 
 
 def test_default_poses_are_assembled_as_in_opensim(corpus_model):

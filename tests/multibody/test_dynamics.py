@@ -74,8 +74,8 @@ def test_inverse_dynamics_undoes_acceleration(case: Case):
     needed = mechanism.inverse_dynamics(q, u, udot)
     _close(needed, matrix @ udot + mechanism.bias(q, u) - mechanism.gravity_forces(q), 1e-12)
     # Compared as forces: where a random joint moves next to no mass the accelerations themselves say little.
-    found = mechanism.acceleration(q, u, generalized_forces=needed)
-    _close(matrix @ found, matrix @ udot, 1e-11 * (1.0 + np.abs(found).max(initial=0.0)))
+    result = mechanism.acceleration(q, u, generalized_forces=needed)
+    _close(matrix @ result, matrix @ udot, 1e-11 * (1.0 + np.abs(result).max(initial=0.0)))
 
 
 @given(cases())
@@ -112,9 +112,9 @@ def test_accelerations_of_the_bodies_are_derivatives_of_their_velocities(case: C
     rates, step = mechanism.rate_matrix(q), 1e-5
     qdot, qddot = rates @ u, rates @ udot + mechanism.rate_bias(q, u)
     high, low = (mechanism.at(q + t * qdot + 0.5 * t * t * qddot, u + t * udot).velocities for t in (step, -step))
-    found = mechanism.at(q, u).accelerations(udot)
-    scale = 1.0 + np.abs(found).max()
-    assert np.abs(found - (high - low) / (2 * step)).max() < 1e-5 * scale
+    result = mechanism.at(q, u).accelerations(udot)
+    scale = 1.0 + np.abs(result).max()
+    assert np.abs(result - (high - low) / (2 * step)).max() < 1e-5 * scale
 
 
 @given(cases(), st.tuples(*[st.floats(-50.0, 50.0)] * 6))

@@ -85,7 +85,7 @@ def changed(text: str, draw: random.Random) -> Iterator[tuple[str, str]]:
         else:
             some = [draw.randrange(len(held))] if draw.random() < 0.7 else [*range(len(held))]
             value = draw.choice(EXTREMES)
-            held = [value if place in some else word for place, word in enumerate(held)]
+            held = [value if index in some else word for index, word in enumerate(held)]
         new = " ".join(held)
         yield f"{whole.path(element)}: {new[:60]}", whole.put((element.head, element.tail, new))
 

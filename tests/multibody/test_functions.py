@@ -28,9 +28,9 @@ def test_values_and_derivatives_are_opensims(item):
     tolerance = 1e-8 if len(set(knots)) < len(knots) else 1e-13
     for x, *expected in item["rows"]:
         value, gradient, hessian = built.evaluate(np.array((x,)))
-        found = (value, gradient[0], hessian[0, 0])
+        result = (value, gradient[0], hessian[0, 0])
         scale = [max(1.0, abs(number)) for number in expected]
-        assert np.abs(np.subtract(found, expected) / scale).max() < tolerance
+        assert np.abs(np.subtract(result, expected) / scale).max() < tolerance
 
 
 @pytest.mark.parametrize(

@@ -52,9 +52,9 @@ def test_angles_of_a_rotation_make_that_rotation(angles, second):
     if second is not None:
         angles[1] = second
     rotation = rotation_xyz(angles)
-    found = angles_xyz(rotation)
-    assert abs(found[1]) <= np.pi / 2
-    assert rotation_xyz(found) == pytest.approx(rotation, abs=1e-7 if second is None else 1e-14)
+    result = angles_xyz(rotation)
+    assert abs(result[1]) <= np.pi / 2
+    assert rotation_xyz(result) == pytest.approx(rotation, abs=1e-7 if second is None else 1e-14)
 
 
 def test_a_rotation_keeps_its_axis_and_turns_the_right_way():

@@ -61,7 +61,7 @@ def file(straight_muscle, tmp_path):
 
 def findings(path, old, new):
     path.write_text(TEXT.replace(old, new))
-    return [(found.code, found.message) for found in osimlite.validate(path).findings]
+    return [(result.code, result.message) for result in osimlite.validate(path).findings]
 
 
 def test_it_is_read_and_written(file, straight_muscle):
@@ -87,8 +87,8 @@ def test_the_linter_knows_its_domains(file):
         ("<pennation_angle_at_optimal>0.1</pennation_angle_at_optimal>", "OSIM207", "should be 0 to 0"),
         ("<width>0.1</width>", "OSIM209", "its grip is above 1 + width: OpenSim refuses the model"),
     ):
-        [(found, message)] = findings(file, "<grip>1.2</grip>", f"<grip>1.2</grip>{new}")
-        assert (found, words in message) == (code, True), message
+        [(result, message)] = findings(file, "<grip>1.2</grip>", f"<grip>1.2</grip>{new}")
+        assert (result, words in message) == (code, True), message
     [(code, message)] = findings(file, "<grip>1.2</grip>", "<grip>0.5</grip>")
     assert code == "OSIM207" and "lengthening fibers bear less than at rest" in message
 
@@ -130,5 +130,5 @@ def test_mujoco_has_it(file):
 def test_without_its_declaration_nobody_knows_it(tmp_path):
     path = tmp_path / "lift.osim"
     path.write_text(TEXT)
-    assert any("StraightMuscle" in found.message for found in osimlite.validate(path).findings)
+    assert any("StraightMuscle" in result.message for result in osimlite.validate(path).findings)
     assert type(osimlite.read(path).force_set.objects[0]).__name__ == "Unknown"

@@ -48,8 +48,8 @@ def carrier(kinds) -> Model:
             )
         )
         joint = getattr(osimlite, kind)(name=f"j{number}")
-        for place, coordinate in enumerate(joint.coordinates):
-            coordinate.name = f"q{number}_{place}"
+        for index, coordinate in enumerate(joint.coordinates):
+            coordinate.name = f"q{number}_{index}"
         at, turned = (0.1, 0.2 * number, -0.05), (0.3, -0.2, 0.1)
         model.add(joint.between(below, body, at=at, turned=turned, child_at=(0, 0.1, 0.03), child_turned=(0.1, 0, 1)))
         below = body
@@ -75,9 +75,9 @@ def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
     with BulletEngine(mechanism, force_elements(model, mechanism)) as engine:
         for _ in range(STATES):
             q, u = rng.uniform(-0.9, 0.9, len(names)), rng.uniform(-2.0, 2.0, len(names))
-            for place, info in enumerate(mechanism.coordinates):
+            for index, info in enumerate(mechanism.coordinates):
                 if info.locked:
-                    q[place], u[place] = info.default_value, 0.0
+                    q[index], u[index] = info.default_value, 0.0
             put(map(theirs.getCoordinateSet().get, names), state, q, u)
             state.setTime(TIME)
             theirs.realizeAcceleration(state)
@@ -88,9 +88,9 @@ def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
             labels, values = [], []
             forces = theirs.getForceSet()
             for number in range(forces.getSize()):
-                found, row = forces.get(number).getRecordLabels(), forces.get(number).getRecordValues(state)
-                labels += [found.get(place) for place in range(found.getSize())]
-                values += [row.get(place) for place in range(found.getSize())]
+                result, row = forces.get(number).getRecordLabels(), forces.get(number).getRecordValues(state)
+                labels += [result.get(index) for index in range(result.getSize())]
+                values += [row.get(index) for index in range(result.getSize())]
             busy += np.count_nonzero(values)
             y = engine.state.pack(q, u)
             assert list(engine.columns) == labels
@@ -128,15 +128,15 @@ ROUTES = (
 
 
 def along(kind, **more):
-    found = []
+    result = []
     for number, route in enumerate(ROUTES):
         force = kind(name=f"along{number}", **more)
         path = GeometryPath(name="path")
-        for place, (frame, at) in enumerate(route):
-            path.path_point_set.objects.append(PathPoint(name=f"p{place}", socket_parent_frame=frame, location=at))
+        for index, (frame, at) in enumerate(route):
+            path.path_point_set.objects.append(PathPoint(name=f"p{index}", socket_parent_frame=frame, location=at))
         force.geometry_path = path
-        found.append(force)
-    return found
+        result.append(force)
+    return result
 
 
 def drive(model, *names):

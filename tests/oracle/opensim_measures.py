@@ -114,8 +114,8 @@ class Beside:
             for length, tension in zip(start.lengths, start.tensions, strict=True):
                 if length == length:
                     yield "OSIM635", start.owner, length, self._fibers(muscle)
-                    found = muscle.getActuation(self.state) / muscle.getMaxIsometricForce()
-                    yield "OSIM635", start.owner, tension, found
+                    result = muscle.getActuation(self.state) / muscle.getMaxIsometricForce()
+                    yield "OSIM635", start.owner, tension, result
                 try:
                     muscle.computeEquilibrium(self.state)
                 except RuntimeError:
@@ -146,10 +146,10 @@ def main(files: list[str]) -> None:
     worst: dict[str, list[tuple[float, str]]] = {}
     for file in files:
         try:
-            for code, owner, told, found in Beside(Path(file)).findings():
+            for code, owner, told, result in Beside(Path(file)).findings():
                 counts[code] += 1
-                off = abs(told - found) / max(1.0, abs(told))
-                worst.setdefault(code, []).append((off, f"{Path(file).name} {owner}: {told:.9g} {found:.9g}"))
+                off = abs(told - result) / max(1.0, abs(told))
+                worst.setdefault(code, []).append((off, f"{Path(file).name} {owner}: {told:.9g} {result:.9g}"))
         except (OsimliteError, RuntimeError) as error:
             print(file, str(error)[:100])
     for code, rows in sorted(worst.items()):

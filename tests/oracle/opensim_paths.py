@@ -59,8 +59,8 @@ def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
                 assert abs(lengths[name] - length) < 1e-12 + spread, name
             assert abs(speeds[name] - path.getLengtheningSpeed(state)) < 1e-10, name
             expected = [path.computeMomentArm(state, coordinate) for coordinate in coordinates]
-            found = [arms[name].get(info.path, 0.0) for info in infos]
-            assert np.allclose(found, expected, rtol=coupled, atol=1e-10, equal_nan=True), name
+            result = [arms[name].get(info.path, 0.0) for info in infos]
+            assert np.allclose(result, expected, rtol=coupled, atol=1e-10, equal_nan=True), name
 
 
 def _jumps(nearby: np.ndarray, length: float) -> bool:
@@ -69,15 +69,15 @@ def _jumps(nearby: np.ndarray, length: float) -> bool:
 
 def _lengths(path, theirs, coordinates, state, poses, u) -> np.ndarray:
     """OpenSim's lengths of a path in some poses."""
-    found = []
+    result = []
     for q in poses:
         put(coordinates, state, q, u)
         theirs.realizePosition(state)
-        found.append(path.getLength(state))
-    return np.array(found)
+        result.append(path.getLength(state))
+    return np.array(result)
 
 
 def _path(theirs, model, owner):
     tree = model.tree()
-    found = theirs.getComponent(tree.path_of(tree.by_path[owner].geometry_path))
-    return opensim.AbstractGeometryPath.safeDownCast(found)
+    result = theirs.getComponent(tree.path_of(tree.by_path[owner].geometry_path))
+    return opensim.AbstractGeometryPath.safeDownCast(result)

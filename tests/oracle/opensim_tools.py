@@ -23,8 +23,8 @@ def run(kind: str, setup: str) -> str:
     """Run a tool in the current folder; how it ended, and what was raised."""
     try:
         # The classes do not look at the tag of the setup; opensim-cmd chooses the class by it.
-        found = opensim.OpenSimObject.makeObjectFromFile(setup)
-        if found is None or found.getConcreteClassName() != kind:
+        result = opensim.OpenSimObject.makeObjectFromFile(setup)
+        if result is None or result.getConcreteClassName() != kind:
             return f"raises no {kind}"
         tool = getattr(opensim, kind)(setup)
         if kind == "MocoStudy":

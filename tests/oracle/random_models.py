@@ -58,13 +58,13 @@ class RandomModel:
         kind = self.choice(list(COORDINATES))
         own = [
             Coordinate(
-                name=f"q{number}_{place}",
+                name=f"q{number}_{index}",
                 default_value=self.number(-0.6, 0.6),
                 default_speed_value=self.number(-2.0, 2.0),
                 locked=self.number(0.0, 1.0) < 0.08,
                 range=(-50.0, 50.0),
             )
-            for place in range(COORDINATES[kind])
+            for index in range(COORDINATES[kind])
         ]
         joint = getattr(osimlite, kind)(name=f"j{number}", coordinates=own)
         if kind == "EllipsoidJoint":
@@ -79,10 +79,10 @@ class RandomModel:
         """Every coordinate moves one axis by itself, and perhaps others by a function."""
         frame = np.linalg.qr(self.rng.normal(size=(3, 3)))[0]
         alone = dict(zip(self.rng.permutation(6).tolist(), names, strict=False))
-        for place, name in enumerate(AXES):
+        for index, name in enumerate(AXES):
             axis = getattr(transform, name)
-            axis.axis = tuple(frame[place % 3].tolist())
-            axis.function, driver = Constant(value=0.0), alone.get(place)
+            axis.axis = tuple(frame[index % 3].tolist())
+            axis.function, driver = Constant(value=0.0), alone.get(index)
             if driver is not None:
                 axis.function = LinearFunction(coefficients=(1.0, 0.0))
             elif self.number(0.0, 1.0) < 0.4:

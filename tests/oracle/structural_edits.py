@@ -256,11 +256,11 @@ def _double(text: Text, draw: random.Random) -> tuple[str, str] | None:
 def _targets(text: Text, element: Element, draw: random.Random) -> Element | None:
     """An element in which another one may be put: of the same tag as that in which it stands, or any."""
     if draw.random() < 0.5:
-        found = text.by_tag.get(text.elements[element.parent].tag, [])
+        result = text.by_tag.get(text.elements[element.parent].tag, [])
     else:
-        found = text.by_tag[draw.choice(sorted(text.by_tag))]
-    found = [f for f in found if not element.start <= f.start < element.end and f.end > f.head]
-    return draw.choice(found) if found else None
+        result = text.by_tag[draw.choice(sorted(text.by_tag))]
+    result = [f for f in result if not element.start <= f.start < element.end and f.end > f.head]
+    return draw.choice(result) if result else None
 
 
 def _copy(text: Text, draw: random.Random) -> tuple[str, str] | None:
@@ -362,9 +362,9 @@ def _reference(text: Text, draw: random.Random) -> tuple[str, str] | None:
     """The text of a leaf that names something, changed."""
     known = set(text.names) | {"ground"}
     groups = {
-        tag: found
+        tag: result
         for tag, leaves in text.leaves.items()
-        if (found := [e for e in leaves if text.inside(e).strip().rpartition("/")[2] in known])
+        if (result := [e for e in leaves if text.inside(e).strip().rpartition("/")[2] in known])
     }
     if not groups:
         return None

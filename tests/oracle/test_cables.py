@@ -123,5 +123,5 @@ def test_cable(elements, tmp_path):
         expected = [coordinate.getAccelerationValue(state) for coordinate in coordinates]
         assert engine.acceleration(0.0, q.tolist(), u.tolist()) == pytest.approx(expected, rel=1e-9, abs=1e-9)
         arms = [path.computeMomentArm(state, coordinate) for coordinate in coordinates]
-        found = paths.moment_arms(q)[name]
-        assert [found.get(info.path, 0.0) for info in mechanism.coordinates] == pytest.approx(arms, rel=0, abs=1e-9)
+        result = paths.moment_arms(q)[name]
+        assert [result.get(info.path, 0.0) for info in mechanism.coordinates] == pytest.approx(arms, rel=0, abs=1e-9)

@@ -34,7 +34,7 @@ def opensim_end(path, values, speeds):
     manager.setIntegratorAccuracy(ACCURACY)
     manager.initialize(state)
     end = manager.integrate(UNTIL)
-    return [coordinates.get(place).getValue(end) for place in range(coordinates.getSize())]
+    return [coordinates.get(index).getValue(end) for index in range(coordinates.getSize())]
 
 
 def test_random_starts(path):

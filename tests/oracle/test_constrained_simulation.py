@@ -40,7 +40,7 @@ def both(path: Path, to: float, accuracy: float, seed: int, **settings: Any) -> 
     opensim.Logger.setLevelString("off")
     model = opensim.Model(str(path))
     state = model.initSystem()
-    coordinates = [model.getCoordinateSet().get(place) for place in range(len(mechanism.coordinates))]
+    coordinates = [model.getCoordinateSet().get(index) for index in range(len(mechanism.coordinates))]
     for info, coordinate, value in zip(mechanism.coordinates, coordinates, trajectory.values[0], strict=True):
         if not info.locked:
             coordinate.setValue(state, float(value), False)

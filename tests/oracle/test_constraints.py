@@ -50,10 +50,10 @@ def _chain(rng: np.random.Generator) -> tuple[Any, Bodies]:
     ):
         spots = [_vec(*rng.uniform(-size, size, 3)) for size in (0.3, 1.0, 0.3, 1.0)]
         joint = getattr(opensim, kind)(name, parent, spots[0], spots[1], child, spots[2], spots[3])
-        for place in range(count):
-            coordinate = joint.upd_coordinates(place)
-            coordinate.setName(f"{name}_{place}")
-            coordinate.set_default_value(0.2 * (place + 1))
+        for index in range(count):
+            coordinate = joint.upd_coordinates(index)
+            coordinate.setName(f"{name}_{index}")
+            coordinate.set_default_value(0.2 * (index + 1))
         model.addJoint(joint)
     return model, bodies
 
@@ -177,8 +177,8 @@ def _loop(kind: str, count: int) -> Change:
             _vec(0.0, 0.1, 0.0),
             _vec(0.1, 0.3, 0.2),
         )
-        for place in range(count):
-            joint.upd_coordinates(place).setName(f"loop_{place}")
+        for index in range(count):
+            joint.upd_coordinates(index).setName(f"loop_{index}")
         model.addJoint(joint)
 
     return add
@@ -206,8 +206,8 @@ def test_a_coupler_by_a_constant_binds_the_dependent_coordinate(tmp_path: Path) 
     model, state, coordinates = _loaded(tmp_path, mechanism)
     pin, free = (mechanism.coordinate_index(name) for name in ("pin_0", "free_3"))
     values = mechanism.values({})
-    for place, coordinate in enumerate(coordinates):
-        coordinate.setValue(state, float(values[place]), False)
+    for index, coordinate in enumerate(coordinates):
+        coordinate.setValue(state, float(values[index]), False)
     model.realizePosition(state)
     assert state.getQErr().to_numpy() == pytest.approx([0.25 - values[pin]])
     (ours,) = (item.position_errors(mechanism.at(values)) for item in mechanism.constraints)
@@ -277,8 +277,8 @@ def test_constrained_motion(case: str, tmp_path: Path) -> None:
         q, u, time = _go(rng, mechanism, state, coordinates)
         _unbroken(model, state)
         udot = _numbers("Acceleration", state, coordinates)
-        found = mechanism.acceleration(q, u, time=time)
-        assert np.abs(found - udot).max() < 1e-9 * (1.0 + np.abs(udot).max())
+        result = mechanism.acceleration(q, u, time=time)
+        assert np.abs(result - udot).max() < 1e-9 * (1.0 + np.abs(udot).max())
 
 
 @pytest.mark.parametrize(("kind", "count"), [("PinJoint", 1), ("BallJoint", 3), ("UniversalJoint", 2)])

@@ -25,15 +25,15 @@ UP = (0.0, 0.0, -1.5707963267948966)
 
 def by_opensim(path, to, accuracy):
     """The states at the end, by label."""
-    found = simulated(path, to, accuracy)
-    return dict(zip(found.columns, found.rows[-1], strict=True))
+    result = simulated(path, to, accuracy)
+    return dict(zip(result.columns, result.rows[-1], strict=True))
 
 
 def by_osimlite(path, to, accuracy):
     trajectory = osimlite.simulate(osimlite.read(path), to, accuracy=accuracy, folder=path.parent)
     trajectory.write(path.parent / "out")
-    found = read_sto(path.parent / "out" / "states.sto")
-    return dict(zip(found.columns, found.rows[-1], strict=True)), trajectory
+    result = read_sto(path.parent / "out" / "states.sto")
+    return dict(zip(result.columns, result.rows[-1], strict=True)), trajectory
 
 
 def compare(path, to=0.5, accuracy=1e-9, tolerance=1e-6):
@@ -80,9 +80,9 @@ def balls(count=2) -> Model:
         joint = osimlite.FreeJoint(name=f"free{number}")
         values = (0.1, 0.0, 0.2, 0.12 * number, 0.2 + 0.3 * number, 0.03 * number)
         speeds = (1.0, 0.0, 3.0 * number, 0.3 - 0.6 * number, -1.0 * number, 0.0)
-        for place, axis in enumerate(("rx", "ry", "rz", "tx", "ty", "tz")):
-            joint.coordinates[place] = Coordinate(
-                name=f"{axis}{number}", default_value=values[place], default_speed_value=speeds[place]
+        for index, axis in enumerate(("rx", "ry", "rz", "tx", "ty", "tz")):
+            joint.coordinates[index] = Coordinate(
+                name=f"{axis}{number}", default_value=values[index], default_speed_value=speeds[index]
             )
         model.add(joint.between(model.ground, body))
         sphere = ContactSphere(name=f"sphere{number}", socket_frame=body, radius=0.1)
@@ -100,7 +100,7 @@ def test_balls_at_several_accuracies(tmp_path):
     for accuracy in (1e-3, 1e-5, 1e-7, 1e-9):
         ours, trajectory = by_osimlite(path, 0.5, accuracy)
         theirs = by_opensim(path, 0.5, accuracy)
-        error, their_error = (max(abs(found[label] - exact[label]) for label in ours) for found in (ours, theirs))
+        error, their_error = (max(abs(result[label] - exact[label]) for label in ours) for result in (ours, theirs))
         # OpenSim hands out states between its steps, so that the two agree no better than they are exact.
         assert error < 10.0 * max(their_error, 1e-8)
         errors.append(error)

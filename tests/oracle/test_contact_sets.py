@@ -83,9 +83,9 @@ def by_osimlite(radii, positions, velocities, simbody_early_return):
         v = (p - q for p, q in zip(moves[first], moves[second], strict=True))
         contacts.append((d, R, k, *rest, *n, *v))
         bodies.append((first, second))
-    found, energy = contact_forces(contacts, TRANSITION, simbody_early_return)
+    result, energy = contact_forces(contacts, TRANSITION, simbody_early_return)
     forces = np.zeros((len(centres), 3))
-    for (first, second), force in zip(bodies, found, strict=True):
+    for (first, second), force in zip(bodies, result, strict=True):
         forces[first] -= force
         forces[second] += force
     return forces[1:], energy

@@ -112,10 +112,10 @@ def test_derivatives(both: Both, corpus_model: Any, engine: str) -> None:
         # Of the value of a coordinate, OpenSim gives the speed.
         owners = [opensim.Coordinate.safeDownCast(both.theirs.getComponent(info.path)) for info in free]
         expected[:n] = [owner.getQDotValue(state) for owner in owners]
-        found = np.array(simulation.engine.derivative(0.0, y))
+        result = np.array(simulation.engine.derivative(0.0, y))
         for part in (slice(n), slice(n, 2 * n), slice(2 * n, None)):
             scale = max(1.0, np.abs(expected[part]).max(initial=0.0))
-            assert np.abs(found[part] - expected[part]).max(initial=0.0) < NEAR * scale
+            assert np.abs(result[part] - expected[part]).max(initial=0.0) < NEAR * scale
 
 
 def _moved(both: Both, paths: Sequence[str], apart: float = 0.0) -> tuple[Any, int]:
@@ -136,7 +136,7 @@ def _moved(both: Both, paths: Sequence[str], apart: float = 0.0) -> tuple[Any, i
 def test_motions(both: Both, corpus_model: Any) -> None:
     """Of 41 models none is refused, 28 end near and take as many steps, 7 end as near as OpenSim's own."""
     names = both.theirs.getStateVariableNames()
-    paths = [names.get(place) for place in range(names.getSize())]
+    paths = [names.get(index) for index in range(names.getSize())]
     if not paths:
         pytest.skip("nothing moves")
     if corpus_model.id in STUCK:
@@ -153,12 +153,12 @@ def test_motions(both: Both, corpus_model: Any) -> None:
         initial = {path: value for path, value in start if path in own or path.rpartition("/")[0] in moving}
         trajectory = simulation.run(SECONDS, accuracy=ACCURACY, report_interval=SECONDS, initial=initial)
     expected, steps = _moved(both, paths)
-    found = {path: values[-1] for path, values in trajectory.auxiliary.items()}
+    result = {path: values[-1] for path, values in trajectory.auxiliary.items()}
     coordinates = simulation.mechanism.coordinates
     for info, value, speed in zip(coordinates, trajectory.values[-1], trajectory.speeds[-1], strict=True):
-        found |= {f"{info.path}/value": value, f"{info.path}/speed": speed}
+        result |= {f"{info.path}/value": value, f"{info.path}/speed": speed}
     scale = max(1.0, np.abs(expected).max())
-    off = max(abs(found[path] - value) for path, value in zip(paths, expected, strict=True))
+    off = max(abs(result[path] - value) for path, value in zip(paths, expected, strict=True))
     if corpus_model.id in SENSITIVE:
         assert off <= 10.0 * max(np.abs(_moved(both, paths, apart)[0] - expected).max() for apart in (1e-14, 1e-11))
     else:

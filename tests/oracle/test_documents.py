@@ -50,10 +50,10 @@ def without_comments(text: str) -> str:
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
 def test_opensim_prints_the_same(path: Path, printed: Path) -> None:
     target = printed / path.name
-    found = read_document(Source.of_file(path), of=Object)
-    lines = osimlite.to_text(found.top, numbers="opensim", comments=False).splitlines(keepends=True)
+    result = read_document(Source.of_file(path), of=Object)
+    lines = osimlite.to_text(result.top, numbers="opensim", comments=False).splitlines(keepends=True)
     # OpenSim drops what it does not know; here it is kept.
-    unknown = [note.word for note in found.notes if note.kind == "unknown-tag"]
+    unknown = [note.word for note in result.notes if note.kind == "unknown-tag"]
     ours = "".join(line for line in lines if not any(line.strip().startswith(f"<{tag}>") for tag in unknown))
     theirs = target.read_text()
     assert ours == without_comments(theirs)

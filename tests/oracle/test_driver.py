@@ -35,6 +35,6 @@ def test_paths_are_opensims_where_the_driver_has_brought_the_model(shared):
         muscle = opensim.Muscle.safeDownCast(theirs.getComponent(path))
         assert lengths[path] == pytest.approx(muscle.getLength(state), rel=0.0, abs=1e-9), path
         for coordinate, arm in arms[path].items():
-            found = opensim.Coordinate.safeDownCast(theirs.getComponent(coordinate))
-            wanted = muscle.computeMomentArm(state, found)
+            result = opensim.Coordinate.safeDownCast(theirs.getComponent(coordinate))
+            wanted = muscle.computeMomentArm(state, result)
             assert arm == pytest.approx(wanted, rel=0.0, abs=1e-8), (path, coordinate)

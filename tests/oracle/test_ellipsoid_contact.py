@@ -74,8 +74,8 @@ def by_opensim(radii, angles, center, velocity):
         joint.get_coordinates(3 + axis).setSpeedValue(state, float(velocity[axis]))
     model.realizeDynamics(state)
     labels, row = force.getRecordLabels(), force.getRecordValues(state)
-    found = {labels.get(k): row.get(k) for k in range(labels.size())}
-    parts = [[found[f"contact.body.{what}.{axis}"] for axis in "XYZ"] for what in ("force", "torque")]
+    result = {labels.get(k): row.get(k) for k in range(labels.size())}
+    parts = [[result[f"contact.body.{what}.{axis}"] for axis in "XYZ"] for what in ("force", "torque")]
     return np.array(parts), model.calcPotentialEnergy(state)
 
 
@@ -110,10 +110,10 @@ def test_in_a_model(kinds, tmp_path):
     model.add(egg, other, ball, plane)
     for number, surfaces in enumerate(((egg, other), (egg, ball), (other, ball), (ball, plane, egg))):
         force = HuntCrossleyForce(name=f"contact{number}", transition_velocity=0.1)
-        for place, surface in enumerate(surfaces):
+        for index, surface in enumerate(surfaces):
             force.contact_parameters.objects.append(
                 HuntCrossleyForce.ContactParameters(
-                    geometry=(surface,), stiffness=1e4 * (1 + place), dissipation=0.01, static_friction=0.5
+                    geometry=(surface,), stiffness=1e4 * (1 + index), dissipation=0.01, static_friction=0.5
                 )
             )
         model.add(force)

@@ -118,9 +118,9 @@ def test_accelerations_and_records(kinds, within, rows, tmp_path, monkeypatch):
             for number in range(added.getSize()):
                 force = added.get(number)
                 if force.get_appliesForce():
-                    found, row = force.getRecordLabels(), force.getRecordValues(state)
-                    labels += [found.get(place) for place in range(found.getSize())]
-                    values += [row.get(place) for place in range(found.getSize())]
+                    result, row = force.getRecordLabels(), force.getRecordValues(state)
+                    labels += [result.get(index) for index in range(result.getSize())]
+                    values += [row.get(index) for index in range(result.getSize())]
             assert list(engine.columns) == labels
             recorded = engine.force_records(time, engine.state.pack(q, u))
             assert recorded == pytest.approx(values, rel=1e-9, abs=1e-9)
@@ -135,7 +135,7 @@ def test_inverse_dynamics(corpus, name, tmp_path, monkeypatch, capfd):
     model = read_text(text)
     mechanism = build_mechanism(model, opensim_derivatives=True)
     times = np.linspace(0.0, 1.0, 120)
-    values = np.array([0.2 * np.sin(3.0 * times + place) for place in range(len(mechanism.coordinates))]).T
+    values = np.array([0.2 * np.sin(3.0 * times + index) for index in range(len(mechanism.coordinates))]).T
     values += mechanism.values({})
     write_sto("motion.mot", "motion", times, mechanism.coordinate_names, values.tolist())
     write_data("data.mot", 700, -0.05, 1.02)

@@ -197,13 +197,13 @@ def test_public_setups_at_the_best_accuracy(
 def test_the_setup_of_a_fit_makes_the_same_model_in_opensim(tmp_path: Path) -> None:
     """Sizes, masses and places of markers, from the generic model."""
     osimlite.write(marked(), tmp_path / "generic.osim")
-    found = osimlite.fit(marked(), {"moving": person(4)[0]}, held=HELD, mass=70.0)
-    texts = person_texts(found, tmp_path / "generic.osim", tmp_path, 70.0)
+    result = osimlite.fit(marked(), {"moving": person(4)[0]}, held=HELD, mass=70.0)
+    texts = person_texts(result, tmp_path / "generic.osim", tmp_path, 70.0)
     for name in (SETUP, UNSCALED):
         (tmp_path / name).write_text(texts[name])
     ask(f"import opensim; {QUIET}; opensim.ScaleTool('{SETUP}').run()", tmp_path)
     theirs = osimlite.read(tmp_path / "generic_fitted.osim")
-    mechanisms = [osimlite.mechanism(model) for model in (found.model, theirs)]
+    mechanisms = [osimlite.mechanism(model) for model in (result.model, theirs)]
     q = np.linspace(-0.3, 0.4, len(mechanisms[0].coordinates))
     ours, others = (mechanism.station_positions(q) for mechanism in mechanisms)
     assert {*ours} == {*others}

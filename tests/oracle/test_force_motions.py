@@ -43,10 +43,10 @@ def double_pendulum() -> Model:
         model.add(joint.between(below, rod, at=(0, -0.5 if number else 0.0, 0)))
         below = rod
     path = GeometryPath(name="path")
-    for place, (frame, at) in enumerate(
+    for index, (frame, at) in enumerate(
         (("/ground", (0.3, -0.1, 0)), ("/bodyset/rod0", (0.05, -0.3, 0)), ("/bodyset/rod1", (0.0, -0.4, 0)))
     ):
-        path.path_point_set.objects.append(PathPoint(name=f"p{place}", socket_parent_frame=frame, location=at))
+        path.path_point_set.objects.append(PathPoint(name=f"p{index}", socket_parent_frame=frame, location=at))
     model.add(
         SpringGeneralizedForce(name="spring", coordinate="q1", stiffness=3.0, rest_length=0.2, viscosity=0.05),
         ExpressionBasedCoordinateForce(name="formula", coordinate="q0", expression="-0.4*q^3 - 0.02*qdot"),

@@ -150,24 +150,24 @@ def trial(folder: Path, model: osimlite.Model, names: Sequence[str], noise: floa
         rotations.append(np.array(off) @ placed)
         places = [state.point(*mechanism.stations[marker.path]) for marker in model.components(osimlite.Marker)]
         rows.append((np.concatenate(places) + rng.normal(0.0, 0.01, 3 * len(places))).tolist())
-    found = np.array(rotations)
-    found[[3, 7, 8], [2, 3, 2]] = np.nan
+    result = np.array(rotations)
+    result[[3, 7, 8], [2, 3, 2]] = np.nan
     if markers:
         marked = [marker.name for marker in model.components(osimlite.Marker)]
         write_trc(folder / "trial.trc", times, marked, rows)
-    write_orientations(folder / "trial.sto", times, names, found)
-    return found
+    write_orientations(folder / "trial.sto", times, names, result)
+    return result
 
 
 def squared(mechanism: Any, names: Sequence[str], q: Any, rotations: Any) -> Any:
     """The squared angles (k,) of sensors from where they were measured; NaN where one was not."""
-    state, found = mechanism.at(q), []
+    state, result = mechanism.at(q), []
     frames = {path.rpartition("/")[2]: frame for path, frame in mechanism.frames.items()}
     for name, wanted in zip(names, rotations, strict=True):
         off = (state.transform(frames[name].body) @ frames[name].transform)[:3, :3] @ wanted.T
         real, *imaginary = quaternion(off)
-        found.append((2.0 * np.arctan2(np.linalg.norm(imaginary), abs(real))) ** 2)
-    return np.array(found)
+        result.append((2.0 * np.arctan2(np.linalg.norm(imaginary), abs(real))) ** 2)
+    return np.array(result)
 
 
 @pytest.mark.parametrize("markers", [False, True])

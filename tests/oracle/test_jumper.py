@@ -23,5 +23,5 @@ def test_opensim_rises_alike(tmp_path):
         motion = simulation.run(0.48, accuracy=1e-8)
     last = dict(zip(theirs.columns, theirs.rows[-1], strict=True))
     ours = dict(zip(motion.coordinates, motion.values[-1], strict=True))
-    found = {path.split("/")[-2]: value for path, value in last.items() if path.endswith("/value")}
-    assert found == pytest.approx(ours, abs=1e-5)
+    result = {path.split("/")[-2]: value for path, value in last.items() if path.endswith("/value")}
+    assert result == pytest.approx(ours, abs=1e-5)

@@ -191,7 +191,7 @@ def _without_target(model: Victim, draw: random.Random) -> Breakage:
 
 @pytest.mark.timeout(SECONDS + 300)
 def test_the_verdict_on_broken_references_of_real_models_is_that_of_opensim(corpus, opensim_says, tmp_path):
-    victims = [found for model in corpus if (found := victim(model, tmp_path / model.id)) is not None]
+    victims = [result for model in corpus if (result := victim(model, tmp_path / model.id)) is not None]
     draw = random.Random(int(os.environ.get("OSIMLITE_SEED", "1")))
     wrong, refused, asked = [], 0, 0
     end = time.monotonic() + SECONDS

@@ -72,17 +72,17 @@ def test_safe_mends_of_damaged_real_files_give_the_models_back(corpus, tmp_path)
     draw = random.Random(7)
     wrong, mends = [], 0
     for model in corpus:
-        found = victim(model, tmp_path / model.id)
-        if found is None or len(found.text) > 400_000:
+        result = victim(model, tmp_path / model.id)
+        if result is None or len(result.text) > 400_000:
             continue
-        path = found.folder / "model.osim"
-        original = printed(found.text, path)
+        path = result.folder / "model.osim"
+        original = printed(result.text, path)
         for damage in DAMAGE:
-            place = draw.choice(found.places[draw.choice(sorted(found.places))])
-            text = found.text[: place.start] + damage(place.word) + found.text[place.start + len(place.word) :]
+            place = draw.choice(result.places[draw.choice(sorted(result.places))])
+            text = result.text[: place.start] + damage(place.word) + result.text[place.start + len(place.word) :]
             fixed, count = safely_mended(text)
             mends += count
-            if count and fixed != found.text and printed(fixed, path) != original:
+            if count and fixed != result.text and printed(fixed, path) != original:
                 wrong.append(f"{model.id} {place.kind}: {place.word} -> {damage(place.word)}")
     assert not wrong, "\n".join(wrong)
     assert mends > 20

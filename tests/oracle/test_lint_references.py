@@ -25,7 +25,7 @@ def breakages(text: str, count: int, seed: int) -> list[tuple[str, str]]:
     draw = random.Random(seed)
     places = [match for match in REFERENCE.finditer(text) if match[2] != ".."]
     names = sorted({word for match in places for word in match[2].split()} | {"RHip_rz", "/jointset/RightShankToThigh"})
-    found = []
+    result = []
     for _ in range(count):
         match = draw.choice(places)
         words = match[2].split()
@@ -52,8 +52,8 @@ def breakages(text: str, count: int, seed: int) -> list[tuple[str, str]]:
             ]
         )
         new = " ".join(words)
-        found.append((f"{match[1]}: {match[2]} -> {new}", text[: match.start(2)] + new + text[match.end(2) :]))
-    return found
+        result.append((f"{match[1]}: {match[2]} -> {new}", text[: match.start(2)] + new + text[match.end(2) :]))
+    return result
 
 
 def connects(path: Path) -> bool:

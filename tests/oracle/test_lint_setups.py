@@ -53,9 +53,9 @@ def control(tmp_path_factory):
 def test_opensim_computes_something_else(tmp_path, control, number):
     tool, least = SILENT[number]
     fault = next(fault for fault in FAULTS if fault.number == number)
-    found = results(tmp_path / "faulty", fault, tool)
-    assert len(found) == len(control[tool])
+    result = results(tmp_path / "faulty", fault, tool)
+    assert len(result) == len(control[tool])
     largest = max(
-        abs(a - b) for one, other in zip(found, control[tool], strict=True) for a, b in zip(one, other, strict=True)
+        abs(a - b) for one, other in zip(result, control[tool], strict=True) for a, b in zip(one, other, strict=True)
     )
     assert largest > least

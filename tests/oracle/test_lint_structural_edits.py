@@ -47,18 +47,18 @@ def claims_refusal(finding: Finding) -> bool:
 
 def new_errors(report: Report, before: Counter[tuple[str, str]]) -> list[Finding]:
     """The errors of an edited model that the model did not have."""
-    left, found = before.copy(), []
+    left, result = before.copy(), []
     for finding in report.errors:
         if left[finding.code, finding.message] > 0:
             left[finding.code, finding.message] -= 1
         else:
-            found.append(finding)
-    return found
+            result.append(finding)
+    return result
 
 
 def victims(models: list[CorpusModel], folder: Path) -> list[Path]:
     """Every model as it was published, and as OpenSim prints it, each in a folder with the files that it needs."""
-    found = []
+    result = []
     for model in models:
         texts = [model.path.read_bytes()]
         if model.converted is not None:
@@ -66,13 +66,13 @@ def victims(models: list[CorpusModel], folder: Path) -> list[Path]:
         for number, text in enumerate(texts):
             if len(text) > LARGEST or b"<Model" not in text:
                 continue
-            found.append(folder / f"{model.id}-{number}" / "model.osim")
-            found[-1].parent.mkdir()
+            result.append(folder / f"{model.id}-{number}" / "model.osim")
+            result[-1].parent.mkdir()
             for other in model.path.parent.iterdir():
                 if other.is_file() and other != model.path:
-                    shutil.copy(other, found[-1].parent / other.name)
-            found[-1].write_bytes(text)
-    return found
+                    shutil.copy(other, result[-1].parent / other.name)
+            result[-1].write_bytes(text)
+    return result
 
 
 @pytest.mark.timeout(SECONDS + 300)

@@ -24,9 +24,9 @@ def read(path):
         labels, times = list(table.getColumnLabels()), list(table.getIndependentColumn())
         return labels, times, numbers, markers.getTableMetaDataString("Units")
     storage = opensim.Storage(str(path))
-    labels = [storage.getColumnLabels().get(place) for place in range(storage.getColumnLabels().getSize())]
+    labels = [storage.getColumnLabels().get(index) for index in range(storage.getColumnLabels().getSize())]
     rows = [storage.getStateVector(row) for row in range(storage.getSize())]
-    numbers = [[row.getData().get(place) for place in range(row.getSize())] for row in rows]
+    numbers = [[row.getData().get(index) for index in range(row.getSize())] for row in rows]
     return labels, [row.getTime() for row in rows], numbers, storage.isInDegrees()
 
 
@@ -74,7 +74,7 @@ def tool_in(path):
     """What OpenSim's tool holds after it has read a setup."""
     tool = opensim.InverseKinematicsTool(str(path), False)
     tasks = tool.getIKTaskSet()
-    weights = [(tasks.get(place).getName(), tasks.get(place).getWeight()) for place in range(tasks.getSize())]
+    weights = [(tasks.get(index).getName(), tasks.get(index).getWeight()) for index in range(tasks.getSize())]
     values = [tool.getPropertyByName(name).toString() for name in ("accuracy", "constraint_weight", "marker_file")]
     return *values, tool.getOutputMotionFileName(), weights
 

@@ -34,14 +34,14 @@ def foundation(name, surfaces, stiffness):
 
 
 def meshes(model, kinds, tmp_path, sizes=(0.5, 0.4, 0.6)):
-    found = []
+    result = []
     for number, (frame, kind) in enumerate(zip(("/bodyset/b1/f1", "/bodyset/b2", "/bodyset/b0"), kinds, strict=False)):
         shape = block if number % 2 else ball
         WRITERS[kind](tmp_path / f"mesh{number}{kind}", *shape(np.array(sizes) * (1.0 + 0.3 * number)))
         place = {"location": (0.1, 0.05, -0.1), "orientation": (0.4, -0.2, 0.7 * number)}
-        found.append(ContactMesh(name=f"m{number}", socket_frame=frame, filename=f"mesh{number}{kind}", **place))
-    model.add(*found)
-    return found
+        result.append(ContactMesh(name=f"m{number}", socket_frame=frame, filename=f"mesh{number}{kind}", **place))
+    model.add(*result)
+    return result
 
 
 @pytest.mark.parametrize("kinds", [(".obj", ".vtp"), (".stl", ".stla")], ids=["polygons", "triangles"])
@@ -59,17 +59,17 @@ def test_meshes_on_spheres_and_what_touches_nothing(model, tmp_path):
     egg = ContactEllipsoid(name="egg", socket_frame="/ground", radii=(1.0, 1.2, 0.9))
     plane = ContactHalfSpace(name="plane", socket_frame="/ground", location=(0, 5, 0), orientation=(0, 0, 1.5))
     model.add(sphere, egg, plane)
-    found = meshes(model, (".obj", ".vtp"), tmp_path)
+    result = meshes(model, (".obj", ".vtp"), tmp_path)
     # Neither the egg nor the two without a mesh touch anything in such a force.
-    model.add(foundation("contact", (*found, sphere, egg), (1e4, 2e4, 0.0, 0.0)))
+    model.add(foundation("contact", (*result, sphere, egg), (1e4, 2e4, 0.0, 0.0)))
     model.add(foundation("nothing", (sphere, egg), (1e4, 0.0)))
     assert compare(model, tmp_path) > 0
 
 
 @pytest.mark.parametrize("kinds", [(".obj", ".obj", ".stl"), (".vtp", ".stl", ".obj")])
 def test_meshes_on_meshes(model, kinds, tmp_path):
-    found = meshes(model, kinds, tmp_path)
-    model.add(foundation("contact", found, (1e4, 2e4, 5e3)))
+    result = meshes(model, kinds, tmp_path)
+    model.add(foundation("contact", result, (1e4, 2e4, 5e3)))
     assert compare(model, tmp_path) > 0
 
 

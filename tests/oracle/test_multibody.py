@@ -62,8 +62,8 @@ def _same_motion(model: Any, state: Any, mechanism: Mechanism) -> None:
         np.array([getattr(item, f"get{what}Value")(state) for item in coordinates])
         for what in ("", "Speed", "Acceleration")
     )
-    found = mechanism.acceleration(q, u)
-    assert np.abs(found - udot).max() < 1e-11 * (1.0 + np.abs(udot).max())
+    result = mechanism.acceleration(q, u)
+    assert np.abs(result - udot).max() < 1e-11 * (1.0 + np.abs(udot).max())
     transforms, velocities = mechanism.body_transforms(q), mechanism.body_velocities(q, u)
     for body in mechanism.bodies:
         theirs = model.getBodySet().get(body.name)
@@ -179,8 +179,8 @@ def test_a_rod_that_bends_evenly_ends_where_opensims_does(tmp_path):
             theirs.getCoordinateSet().get(name).setValue(state, value, False)
         theirs.realizePosition(state)
         placed = theirs.getBodySet().get(0).getTransformInGround(state)
-        found = [[placed.R().get(row, k) for k in range(3)] + [placed.p().get(row)] for row in range(3)]
-        assert np.array(found) == pytest.approx(mechanism.body_transforms(q)["tip"][:3], abs=1e-12)
+        result = [[placed.R().get(row, k) for k in range(3)] + [placed.p().get(row)] for row in range(3)]
+        assert np.array(result) == pytest.approx(mechanism.body_transforms(q)["tip"][:3], abs=1e-12)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.2])
@@ -204,8 +204,8 @@ def test_a_constant_turn_before_another(angle: float, tmp_path: Path) -> None:
         for coordinate, value in zip(coordinates, values, strict=True):
             coordinate.setValue(state, float(value), False)
         theirs.realizePosition(state)
-        found = theirs.getBodySet().get(0).getTransformInGround(state).R()
-        return np.array([[found.get(row, column) for column in range(3)] for row in range(3)])
+        result = theirs.getBodySet().get(0).getTransformInGround(state).R()
+        return np.array([[result.get(row, column) for column in range(3)] for row in range(3)])
 
     spin = (rotation(q + h * u) - rotation(q - h * u)) @ rotation(q).T / (2.0 * h)
     seen = np.array((spin[2, 1], spin[0, 2], spin[1, 0]))

@@ -111,11 +111,11 @@ def test_real_models_assemble_as_in_opensim(corpus_model: Any, tmp_path: Path) -
     model, state = _without_forces(path)
     rng = np.random.default_rng(1)
     q, _ = mechanism.default_state()
-    for place, info in enumerate(mechanism.coordinates):
+    for index, info in enumerate(mechanism.coordinates):
         if not info.locked:
-            q[place] += rng.uniform(-0.1, 0.1)
+            q[index] += rng.uniform(-0.1, 0.1)
         if info.clamped:
-            q[place] = np.clip(q[place], *info.range)
+            q[index] = np.clip(q[index], *info.range)
     coordinates = _assign(model, state, q, 0.0 * q)
     model.assemble(state)
     theirs, ours = np.array([item.getValue(state) for item in coordinates]), mechanism.assemble(q)

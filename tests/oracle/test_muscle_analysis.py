@@ -70,10 +70,10 @@ def compare(ours: Path, theirs: Path, tolerance: float = 1e-8, small: float = 1e
 def with_muscles_of(model: Model, cls: type[Muscle], more: dict[str, Any]) -> Model:
     """A model whose muscles are of another class."""
     forces = model.force_set.objects
-    for place, muscle in enumerate(list(forces)):
+    for index, muscle in enumerate(list(forces)):
         if isinstance(muscle, Muscle):
-            forces[place] = cls(**{name: getattr(muscle, name) for name in KEPT}, **more)
-            forces[place].geometry_path = muscle.geometry_path.copy_deep()
+            forces[index] = cls(**{name: getattr(muscle, name) for name in KEPT}, **more)
+            forces[index].geometry_path = muscle.geometry_path.copy_deep()
     return model
 
 

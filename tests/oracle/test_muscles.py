@@ -152,8 +152,8 @@ def test_the_steps_of_a_motion(both, engine, tmp_path):
         osimlite.read(tmp_path / "model.osim"), to, engine, accuracy=1e-5, initial={"x": 0.27}, equilibrate=True
     )
     assert trajectory.summary["steps"] == manager.getStatesTable().getNumRows() - 1
-    found = trajectory.auxiliary | {"/jointset/slide/x/value": trajectory.values[:, 0]}
-    for path, values in found.items():
+    result = trajectory.auxiliary | {"/jointset/slide/x/value": trajectory.values[:, 0]}
+    for path, values in result.items():
         assert values[-1] == pytest.approx(theirs.getStateVariableValue(end, path), rel=1e-9, abs=1e-9)
 
 
@@ -221,9 +221,9 @@ def test_whole_models(name, corpus):
     end = manager.integrate(0.05)
     for trajectory in trajectories:
         assert trajectory.summary["steps"] == manager.getStatesTable().getNumRows() - 1
-        found = {path: values[-1] for path, values in trajectory.auxiliary.items()}
+        result = {path: values[-1] for path, values in trajectory.auxiliary.items()}
         for info, value, speed in zip(mechanism.coordinates, trajectory.values[-1], trajectory.speeds[-1], strict=True):
-            found |= {f"{info.path}/value": value, f"{info.path}/speed": speed}
-        expected = {path: theirs.getStateVariableValue(end, path) for path in found}
+            result |= {f"{info.path}/value": value, f"{info.path}/speed": speed}
+        expected = {path: theirs.getStateVariableValue(end, path) for path in result}
         scale = max(1.0, *map(abs, expected.values()))
-        assert max(abs(found[path] - expected[path]) for path in found) < 1e-9 * scale
+        assert max(abs(result[path] - expected[path]) for path in result) < 1e-9 * scale

@@ -43,7 +43,7 @@ def outputs(model: Model) -> list[str]:
     for component in model.components():
         if not tree.is_internal(component):
             by_class.setdefault(type(component).__name__, []).append(component)
-    found = []
+    result = []
     for name, components in by_class.items():
         refused = NOT_YET | (WITH_MASS if name == "Millard2012AccelerationMuscle" else set())
         for component in {id(one): one for one in (components[0], components[-1])}.values():
@@ -51,8 +51,8 @@ def outputs(model: Model) -> list[str]:
             for output, kind in outputs_of(type(component)).items():  # type: ignore[arg-type]
                 plain = kind.type in ("double", "Vec3", "SpatialVec") and not kind.channels
                 if plain and output not in refused and name not in NEVER and not output.startswith("implicit"):
-                    found.append(f"{path}|{output}")
-    return found
+                    result.append(f"{path}|{output}")
+    return result
 
 
 @pytest.mark.parametrize("name", ["m0001", "jumper", "m0013", "m0954", "with masses"])
@@ -73,11 +73,11 @@ def test_every_output(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPat
         mine, wanted = read_sto(file), read_sto(theirs / file.name)
         assert mine.times.tolist() == wanted.times.tolist()
         largest = np.nanmax(np.abs(wanted.rows), axis=0, initial=0.0)
-        for place, column in enumerate(wanted.columns):
-            apart = np.abs(mine.rows[:, place] - wanted.rows[:, place])
+        for index, column in enumerate(wanted.columns):
+            apart = np.abs(mine.rows[:, index] - wanted.rows[:, index])
             # What a stiff tendon stores is as exact as OpenSim's equilibrium, which ends at 1e-8 of a force.
             near = 1e-6 if column.endswith("potential_energy") else 1e-8
-            assert apart.max() <= near * largest[place] + near, column
+            assert apart.max() <= near * largest[index] + near, column
 
 
 def test_what_is_no_number_is_left_out_and_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

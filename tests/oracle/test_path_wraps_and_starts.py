@@ -99,9 +99,9 @@ def test_ranges_of_wraps(tmp_path: Path, ranges: list[str], count: int) -> None:
         with pytest.raises(ModelError, match=r"the range of .* ends at point"):
             osimlite.paths(osimlite.read(path))
         return
-    found = osimlite.paths(osimlite.read(path))
+    result = osimlite.paths(osimlite.read(path))
     for value, (length, arm) in zip((0.0, 0.05, 0.2), theirs, strict=True):
-        (ours,), (arms,) = found.lengths([value, 0.1]).values(), found.moment_arms([value, 0.1]).values()
+        (ours,), (arms,) = result.lengths([value, 0.1]).values(), result.moment_arms([value, 0.1]).values()
         assert ours == pytest.approx(length, rel=1e-14)
         assert next(iter(arms.values())) == pytest.approx(arm, abs=1e-9)
 

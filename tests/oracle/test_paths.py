@@ -95,8 +95,8 @@ PATHS = {
 def with_springs(model):
     for number, points in enumerate(PATHS.values()):
         path = GeometryPath(name="path")
-        for place, point in enumerate(points):
-            path.path_point_set.objects.append(point.model_copy(update={"name": f"p{place}"}))
+        for index, point in enumerate(points):
+            path.path_point_set.objects.append(point.model_copy(update={"name": f"p{index}"}))
         spring = PathSpring(name=f"spring{number}", resting_length=0.2, stiffness=300.0, dissipation=0.4)
         spring.geometry_path = path
         model.add(spring)

@@ -35,12 +35,14 @@ def test_what_opensim_declares_is_what_the_classes_are(tmp_path):
     ours = osimlite.classes_in(tmp_path / "ours.json")
     for name in CLASSES:
         theirs = getattr(osimlite, name)
-        wanted, found = field_specs(theirs), field_specs(ours[f"Our{name}"])
-        assert list(found) == list(wanted), name
+        wanted, result = field_specs(theirs), field_specs(ours[f"Our{name}"])
+        assert list(result) == list(wanted), name
         plain, made = theirs(), ours[f"Our{name}"]()
         for tag, spec in wanted.items():
             if not isinstance(spec.kind, Reference):
-                assert type(found[tag].kind) is type(spec.kind), f"{name}/{tag}"
+                assert type(result[tag].kind) is type(spec.kind), f"{name}/{tag}"
             if spec.factory is None and type(getattr(plain, spec.name)) is float:
                 # OpenSim says six digits.
-                assert getattr(made, found[tag].name) == pytest.approx(getattr(plain, spec.name), rel=1e-5, nan_ok=True)
+                assert getattr(made, result[tag].name) == pytest.approx(
+                    getattr(plain, spec.name), rel=1e-5, nan_ok=True
+                )

@@ -23,12 +23,12 @@ NAMES = (*FAR, "sphere_x", "edge_far_cylinder_x", "cylinder_sphere_ellipsoid")
 
 def drawn(path, state) -> np.ndarray:
     """The corners (k, 3) of the lines that OpenSim draws of a path."""
-    found = []
+    result = []
 
     class Lines(opensim.DecorativeGeometryImplementation):  # type: ignore[misc]
         def implementLineGeometry(self, line):
             for point in (line.getPoint1(), line.getPoint2()):
-                found.append([point.get(axis) for axis in range(3)])
+                result.append([point.get(axis) for axis in range(3)])
 
         def implementSphereGeometry(self, _):
             """A point of the path; it is an end of a line too."""
@@ -37,7 +37,7 @@ def drawn(path, state) -> np.ndarray:
     path.generateDecorations(False, opensim.ModelDisplayHints(), state, shapes)
     for number in range(shapes.size()):
         shapes.at(number).implementGeometry(reader)
-    return np.array(found)
+    return np.array(result)
 
 
 def distances(points: np.ndarray, line: np.ndarray) -> np.ndarray:

@@ -76,10 +76,10 @@ def compare(model, tmp_path, tolerance=1e-9):
         theirs.realizeReport(state)
         probes = [theirs.getProbeSet().get(number) for number in range(theirs.getProbeSet().getSize())]
         expected = [probe.getProbeOutputs(state).to_numpy().tolist() for probe in probes if probe.isEnabled()]
-        found = system.probe_results(TIME, system.state.pack(q.tolist(), u.tolist(), z.tolist()))
-        found = [[probe.gain * x for x in row] for probe, row in zip(system.probes, found, strict=True)]
-        assert [len(row) for row in found] == [len(row) for row in expected]
-        for ours, row in zip(found, expected, strict=True):
+        result = system.probe_results(TIME, system.state.pack(q.tolist(), u.tolist(), z.tolist()))
+        result = [[probe.gain * x for x in row] for probe, row in zip(system.probes, result, strict=True)]
+        assert [len(row) for row in result] == [len(row) for row in expected]
+        for ours, row in zip(result, expected, strict=True):
             scale = max([1.0, *(abs(x) for x in row if np.isfinite(x))])
             assert ours == pytest.approx(row, rel=tolerance, abs=tolerance * scale, nan_ok=True)
 
@@ -219,8 +219,8 @@ def test_smooth_metabolic_powers(model, switches, tmp_path):
         theirs.realizeReport(state)
         expected = [getattr(outputs, f"getTotal{total}Rate")(state) for total in totals]
         expected += [outputs.getMuscleMetabolicRate(state, f"/forceset/along{number}") for number in (0, 1)]
-        (found,) = system.probe_results(TIME, system.state.pack(q.tolist(), u.tolist()))
-        assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
+        (result,) = system.probe_results(TIME, system.state.pack(q.tolist(), u.tolist()))
+        assert result == pytest.approx(expected, rel=1e-9, abs=1e-9)
     ends = ["metabolic", "activation", "maintenance", "shortening", "mechanical_work"]
     labels = [f"/used|total_{end}_rate" for end in ends]
     labels += [f"/used|muscle_metabolic_rate:/forceset/along{number}" for number in (0, 1)]
@@ -260,12 +260,12 @@ def compare_motion(model, tmp_path, to=0.3, accuracy=1e-5):
         steps.append((stepper.time, stepper.state))
         stepper.table([to])
         stepper.catch_up()
-        found = np.array(list(probe_rows(ready.engine, steps, steps)))
+        result = np.array(list(probe_rows(ready.engine, steps, steps)))
         assert probe_labels(ready.engine.probes) == labels
         assert [t for t, _ in steps] == pytest.approx(times, abs=1e-9)
         # A rate of second order is twice a difference of neighbours, less the rate before.
         scale = np.maximum(1.0, np.abs(rows).max(axis=0))
-        assert np.abs((found - rows) / scale).max() <= 1e-9
+        assert np.abs((result - rows) / scale).max() <= 1e-9
         trajectory = ready.run(to, accuracy=accuracy)
         assert list(trajectory.probes) == labels
         ends = np.array([column[[0, -1]] for column in trajectory.probes.values()])

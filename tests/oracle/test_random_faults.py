@@ -148,14 +148,14 @@ def test_what_opensim_refuses_is_found(project, opensim_runs, tmp_path):
     for fault in islice(faults(folder.project, draw), WANTED // 2):
         verdict, said = tools.verdict(fault, draw)
         findings = folder.found(fault)
-        found = in_place(fault, findings)
-        worst = "error" if any(f.severity == "error" for f in found) else "finding" if found else "none"
+        result = in_place(fault, findings)
+        worst = "error" if any(f.severity == "error" for f in result) else "finding" if result else "none"
         counts[fault.kind, verdict, worst] += 1
         refused = verdict in ("hangs", "crashes", "raises", "false")
-        if (refused or (verdict == "changes" and (fault.sure or fault.kind not in UNKNOWABLE))) and not found:
+        if (refused or (verdict == "changes" and (fault.sure or fault.kind not in UNKNOWABLE))) and not result:
             wrong.append(f"MISSED {verdict} {fault.kind} {fault.what}\n  {said[:300]}\n  {sorted(fault.places)}")
             wrong += [f"  elsewhere: {f}" for f in findings[:2]]
-        alarms = [f for f in found if f.severity == "error" and f.code not in LOST]
+        alarms = [f for f in result if f.severity == "error" and f.code not in LOST]
         if verdict == "nothing" and alarms:
             wrong.append(f"ALARM {fault.kind} {fault.what}\n  {said[:300]}")
             wrong += [f"  {f}" for f in alarms]

@@ -130,8 +130,8 @@ def test_same_steps_at_every_accuracy(tmp_path):
     """The error control is OpenSim's, so the steps are."""
     model = dynamic_walker()
     osimlite.write(model, tmp_path / "model.osim")
-    for place, accuracy in enumerate((1e-3, 1e-5)):
-        folder = tmp_path / str(place)
+    for index, accuracy in enumerate((1e-3, 1e-5)):
+        folder = tmp_path / str(index)
         folder.mkdir()
         states, _ = opensim_run(tmp_path / "model.osim", 1.0, accuracy, folder)
         # One row is the start.

@@ -28,8 +28,8 @@ def test_opensim_reads_what_we_write_and_back(kind, tmp_path):
     theirs = getattr(opensim, f"TimeSeriesTable{ending}")(str(tmp_path / "ours.sto"))
     assert tuple(theirs.getColumnLabels()) == ("a b", "c")
     flat = theirs if size == 1 else theirs.flatten()
-    found = [flat.getRowAtIndex(row).to_numpy() for row in range(flat.getNumRows())]
-    assert np.abs(np.array(found) - rows).max() < 1e-15
+    result = [flat.getRowAtIndex(row).to_numpy() for row in range(flat.getNumRows())]
+    assert np.abs(np.array(result) - rows).max() < 1e-15
     adapter = getattr(opensim, f"STOFileAdapter{ending}")
     adapter.write(theirs, str(tmp_path / "theirs.sto"))
     table = read_sto(tmp_path / "theirs.sto")
@@ -63,6 +63,6 @@ def test_opensim_reads_our_markers(tmp_path):
     table = opensim.TimeSeriesTableVec3(str(tmp_path / "markers.trc"))
     assert tuple(table.getColumnLabels()) == ("knee.med", "heel")
     assert list(table.getIndependentColumn()) == times
-    found = [[table.getRowAtIndex(row)[k][axis] for k in range(2) for axis in range(3)] for row in range(3)]
-    assert np.array_equal(found, rows, equal_nan=True)
+    result = [[table.getRowAtIndex(row)[k][axis] for k in range(2) for axis in range(3)] for row in range(3)]
+    assert np.array_equal(result, rows, equal_nan=True)
     assert table.getTableMetaDataAsString("DataRate") == "100" and table.getTableMetaDataAsString("Units") == "m"

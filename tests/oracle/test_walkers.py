@@ -31,13 +31,13 @@ def walks(fixtures):
         name: Order(fixtures / "walkers" / f"{name}.osim", LONG[name], accuracy) for name, accuracy in ACCURACY.items()
     }
     theirs = opensim_walks(orders)
-    found = {}
+    result = {}
     for name, order in orders.items():
         with Simulation(osimlite.read(order.path), "compiled") as simulation:
             start = simulation.initial_state({}, {})
             (ours,) = walk_many(simulation.engine, [start], order.to, accuracy=order.accuracy)
-        found[name] = theirs[name][0], ours
-    return found
+        result[name] = theirs[name][0], ours
+    return result
 
 
 @pytest.mark.parametrize("name", ["steady-walker", "human-walker"])
@@ -62,6 +62,6 @@ def test_ours_is_the_same_walk(walks, name):
     assert theirs.end == pytest.approx(ours.end, abs=1e-3)
     assert [step.foot for step in theirs.steps] == [step.foot for step in ours.steps]
     for field in ("time", "air", "length"):
-        found = [getattr(step, field) for step in theirs.steps]
-        assert found == pytest.approx([getattr(step, field) for step in ours.steps], abs=1e-3), field
+        result = [getattr(step, field) for step in theirs.steps]
+        assert result == pytest.approx([getattr(step, field) for step in ours.steps], abs=1e-3), field
     assert theirs.distance == pytest.approx(ours.distance, rel=5e-6, abs=1e-5)

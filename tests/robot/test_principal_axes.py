@@ -17,17 +17,17 @@ def test_axes_and_moments_give_the_tensor_back(moments, turn):
     rotation = rotation_xyz(np.array(turn))
     inertia = rotation @ np.diag(moments) @ rotation.T
     inertia = (inertia + inertia.T) / 2.0
-    found, axes = principal_axes(inertia)
+    result, axes = principal_axes(inertia)
     scale = max(moments)
-    assert np.abs(axes @ np.diag(found) @ axes.T - inertia).max() < 1e-14 * scale
+    assert np.abs(axes @ np.diag(result) @ axes.T - inertia).max() < 1e-14 * scale
     assert np.abs(axes @ axes.T - np.eye(3)).max() < 1e-14 and np.linalg.det(axes) > 0.0
-    assert np.abs(np.sort(found) - np.sort(moments)).max() < 1e-14 * scale
+    assert np.abs(np.sort(result) - np.sort(moments)).max() < 1e-14 * scale
 
 
 @given(st.tuples(sizes, sizes, sizes))
 def test_a_diagonal_tensor_keeps_its_axes(moments):
-    found, axes = principal_axes(np.diag(moments))
-    assert (found == np.array(moments)).all() and (axes == np.eye(3)).all()
+    result, axes = principal_axes(np.diag(moments))
+    assert (result == np.array(moments)).all() and (axes == np.eye(3)).all()
 
 
 def test_axes_turn_as_little_as_they_can():

@@ -76,10 +76,10 @@ def declared(tag: str) -> Any:
 
 
 def references() -> dict[tuple[str, str], dict]:
-    found = {}
+    result = {}
     for entry in REFERENCES:
-        found[entry["cls"], entry["property"]] = entry
-    return found
+        result[entry["cls"], entry["property"]] = entry
+    return result
 
 
 REFERENCE_OF = references()

@@ -53,6 +53,6 @@ def test_an_object_that_bears_the_name_of_a_muscle_refers_to_it(model: Model) ->
     members.append(Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter(name="biceps"))
     members.append(Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter(name="triceps"))
     tree = model.tree()
-    found = {use.value: tree.resolve(use) for use in tree.uses() if use.spec.tag == "@name"}
-    assert found["biceps"].target is model.find("/forceset/biceps")
-    assert found["triceps"].failure == "missing"
+    result = {use.value: tree.resolve(use) for use in tree.uses() if use.spec.tag == "@name"}
+    assert result["biceps"].target is model.find("/forceset/biceps")
+    assert result["triceps"].failure == "missing"

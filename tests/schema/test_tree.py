@@ -196,8 +196,8 @@ def test_an_object_that_is_made_when_someone_asks_for_it_has_an_owner(walker: Mo
 
 def test_every_object_of_the_file_is_found_by_its_class(walker: Model) -> None:
     by_class = walker.tree().by_class
-    found = [id(item) for items in by_class.values() for item in items]
-    assert len(found) == len(set(found))
+    result = [id(item) for items in by_class.values() for item in items]
+    assert len(result) == len(set(result))
     assert all(type(item) is cls for cls, items in by_class.items() for item in items)
-    assert {id(item) for item in walker.walk() if item._index is not None} <= set(found)
+    assert {id(item) for item in walker.walk() if item._index is not None} <= set(result)
     assert [id(item) for item in walker.components(Body)] == [id(item) for item in by_class[Body]]

@@ -66,8 +66,8 @@ def chain() -> Model:
         inertia = (0.2, 0.3, 0.25, 0.01, -0.02, 0.03)
         body = model.add(Body(name=f"b{number}", mass=1.0 + number, mass_center=(0, -0.1, 0.05), inertia=inertia))
         joint = kind(name=f"j{number}")
-        for place, coordinate in enumerate(joint.coordinates):
-            coordinate.name = f"q{number}_{place}"
+        for index, coordinate in enumerate(joint.coordinates):
+            coordinate.name = f"q{number}_{index}"
         model.add(joint.between(carrier, body, at=(0.1, 0.2, -0.05), turned=(0.3, -0.2, 0.1), child_at=(0, 0.1, 0)))
         carrier = body
     b1 = next(item for item in model.components(Body) if item.name == "b1")
@@ -81,14 +81,14 @@ def chain() -> Model:
 
 
 def straight(*more) -> GeometryPath:
-    found = GeometryPath(name="path")
-    found.path_point_set.objects += (
+    result = GeometryPath(name="path")
+    result.path_point_set.objects += (
         PathPoint(name="start", socket_parent_frame="/ground", location=(0.5, 0.1, 0.0)),
         PathPoint(name="over", socket_parent_frame="/bodyset/b0", location=(0.1, 0.3, 0.2)),
         *more,
         PathPoint(name="end", socket_parent_frame="/bodyset/b2", location=(0.0, -0.3, 0.1)),
     )
-    return found
+    return result
 
 
 def around(path, *surfaces) -> GeometryPath:
@@ -107,14 +107,14 @@ OBSTACLES = (
 
 def over(path, surfaces) -> Scholz2015GeometryPath:
     """The path over surfaces between its last two points."""
-    found = Scholz2015GeometryPath(name="path")
+    result = Scholz2015GeometryPath(name="path")
     for point in path.path_point_set.objects:
-        found.path_elements.append(Scholz2015GeometryPathPoint(name=f"e_{point.name}", path_point=point))
+        result.path_elements.append(Scholz2015GeometryPathPoint(name=f"e_{point.name}", path_point=point))
     for surface in surfaces:
         obstacle = Scholz2015GeometryPathObstacle(name=f"over_{surface.name}", contact_hint=(0.0, 0.2, 0.0))
         obstacle.socket_contact_geometry = f"/contactgeometryset/{surface.name}"
-        found.path_elements.insert(-1, obstacle)
-    return found
+        result.path_elements.insert(-1, obstacle)
+    return result
 
 
 def between(kind, one="/bodyset/b0", two="/bodyset/b3", **more):
@@ -149,12 +149,12 @@ def contact(*surfaces):
 
 def driven(actuator, *functions):
     """An actuator with a controller for each function."""
-    found = [actuator]
+    result = [actuator]
     for number, function in enumerate(functions):
         controller = PrescribedController(name=f"c{number}", socket_actuators=("/forceset/a",))
         controller.ControlFunctions.objects.append(function)
-        found.append(controller)
-    return found
+        result.append(controller)
+    return result
 
 
 def pushed(**more):

@@ -39,8 +39,8 @@ def block(sizes: Sequence[float]) -> tuple[np.ndarray, Faces]:
 
 def triangles(points: np.ndarray, faces: Faces) -> np.ndarray:
     """Corners (t, 3, 3): every face as a fan about its first corner."""
-    found = [(face[0], face[k], face[k + 1]) for face in faces for k in range(1, len(face) - 1)]
-    return points[np.array(found)]
+    result = [(face[0], face[k], face[k + 1]) for face in faces for k in range(1, len(face) - 1)]
+    return points[np.array(result)]
 
 
 def write_obj(path: Path, points: np.ndarray, faces: Faces) -> None:

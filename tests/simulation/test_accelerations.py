@@ -103,8 +103,8 @@ def chain(*joint_types, spheres=(), inertia=(0.02, 0.03, 0.025, 0.001, -0.002, 0
     for number, joint_type in enumerate(joint_types):
         body = model.add(Body(name=f"b{number}", mass=1.0 + number, mass_center=(0.05, -0.1, 0.02), inertia=inertia))
         joint = getattr(osimlite, joint_type)(name=f"j{number}")
-        for place, coordinate in enumerate(joint.coordinates):
-            coordinate.name = f"q{number}_{place}"
+        for index, coordinate in enumerate(joint.coordinates):
+            coordinate.name = f"q{number}_{index}"
         at, turned = (0.1, 0.2 * number, -0.05), (0.3, -0.2, 0.1)
         model.add(
             joint.between(carrier, body, at=at, turned=turned, child_at=(0.0, 0.1, 0.03), child_turned=(0.1, 0, 1))
@@ -195,11 +195,11 @@ def test_limit_of_an_angle_of_a_ball_joint_acts_on_its_speed(route):
 def test_long_chains_by_both_routes(seed, lengths):
     mechanism = build_mechanism(chain(*lengths))
     q, u = state_of(mechanism, seed)
-    found = []
+    result = []
     for route in ROUTES:
         with BulletEngine(mechanism, Forces(()), route=route) as engine:
-            found.append(engine.acceleration(0.0, q.tolist(), u.tolist()))
-    assert within(found[0], found[1], 1e-8)
+            result.append(engine.acceleration(0.0, q.tolist(), u.tolist()))
+    assert within(result[0], result[1], 1e-8)
 
 
 # ------------------------------------------------------------------------------------------ what is refused

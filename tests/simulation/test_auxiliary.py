@@ -64,8 +64,8 @@ def test_many_runs_equal_single_ones():
         starts = np.array([simulation.initial_state({"q1": q}, {}) for q in (0.1, 0.5, 0.9)])
         runs = run_many(simulation.engine, starts, 0.3, accuracy=1e-6, report_times=times, event_states=True)
         assert runs.states.shape == starts.shape and runs.reports.shape == (3, 4, starts.shape[1])
-        for place, q in enumerate((0.1, 0.5, 0.9)):
+        for index, q in enumerate((0.1, 0.5, 0.9)):
             alone = simulation.run(0.3, accuracy=1e-6, initial={"q1": q}, report_interval=0.1)
-            values, speeds = simulation.state.histories(runs.states[place][None])
+            values, speeds = simulation.state.histories(runs.states[index][None])
             assert np.array_equal(values[0], alone.values[-1]) and np.array_equal(speeds[0], alone.speeds[-1])
-            assert runs.counts[place, 0] == alone.summary["steps"]
+            assert runs.counts[index, 0] == alone.summary["steps"]

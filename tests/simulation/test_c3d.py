@@ -60,13 +60,13 @@ def test_loads_of_a_c3d_file_are_those_of_a_table(tmp_path: Path) -> None:
     shutil.copy(TRIALS / "force_plate.c3d", tmp_path / "trial.c3d")
     table = read_c3d_forces(tmp_path / "trial.c3d")
     write_sto(tmp_path / "trial.sto", "forces", table.times.tolist(), table.columns, table.rows.tolist())
-    mechanism, found = osimlite.mechanism(dynamic_walker()), []
+    mechanism, result = osimlite.mechanism(dynamic_walker()), []
     for file in ("trial.c3d", "trial.sto"):
         (tmp_path / "loads.xml").write_text(LOADS.format(file=file))
         (force,) = read_external_loads(mechanism, tmp_path / "loads.xml")
         load: Any = force.place
-        found.append([f.derivatives(0.0123)[0] for f in (*load.force, *load.point, *load.torque)])
-    assert found[0] == pytest.approx(found[1], rel=1e-12) and len(found[0]) == 9
+        result.append([f.derivatives(0.0123)[0] for f in (*load.force, *load.point, *load.torque)])
+    assert result[0] == pytest.approx(result[1], rel=1e-12) and len(result[0]) == 9
 
 
 def test_what_has_no_forces_is_told(tmp_path: Path) -> None:

@@ -56,9 +56,9 @@ def within(ours, expected, tolerance=1e-9):
 def state_of(mechanism, seed):
     rng, size = np.random.default_rng(seed), len(mechanism.coordinates)
     q, u = rng.uniform(-1.0, 1.0, size), rng.uniform(-2.0, 2.0, size)
-    for place, info in enumerate(mechanism.coordinates):
+    for index, info in enumerate(mechanism.coordinates):
         if info.locked:
-            q[place], u[place] = info.default_value, 0.0
+            q[index], u[index] = info.default_value, 0.0
     return q, u
 
 
@@ -185,11 +185,11 @@ def contact_chain():
     for number, kind in enumerate((osimlite.FreeJoint, osimlite.BallJoint)):
         body = model.add(Body(name=f"b{number}", mass=1.0 + number, inertia=(0.2, 0.3, 0.25, 0.01, -0.02, 0.03)))
         joint = kind(name=f"j{number}")
-        for place, coordinate in enumerate(joint.coordinates):
-            coordinate.name = f"q{number}_{place}"
+        for index, coordinate in enumerate(joint.coordinates):
+            coordinate.name = f"q{number}_{index}"
         model.add(joint.between(carrier, body, at=(0.1, 0.2, -0.05), turned=(0.3, -0.2, 0.1), child_at=(0, 0.1, 0)))
-        for place in range(2):
-            sphere = ContactSphere(name=f"s{number}{place}", socket_frame=body, radius=0.3, location=(0.1, -0.2, place))
+        for index in range(2):
+            sphere = ContactSphere(name=f"s{number}{index}", socket_frame=body, radius=0.3, location=(0.1, -0.2, index))
             surfaces.append(model.add(sphere))
         carrier = body
     surfaces.append(model.add(ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0.1, 0.2, -1.4))))
@@ -260,7 +260,7 @@ def fast(walker):
 
 def largest_error(trajectory, table):
     return max(
-        np.abs(trajectory.values[:, place] - table[name]).max() for place, name in enumerate(trajectory.coordinates)
+        np.abs(trajectory.values[:, index] - table[name]).max() for index, name in enumerate(trajectory.coordinates)
     )
 
 

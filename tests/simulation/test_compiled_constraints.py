@@ -100,7 +100,7 @@ def test_the_derivatives_of_opensim(opensim_derivatives: bool):
     mechanism = knee(opensim_derivatives=opensim_derivatives)
     q, u = np.array((0.4, -0.3, 0.2, 0.5)), np.array((2.0, -1.0, 1.5, 0.7))
     assert accelerations(mechanism, q, u) == pytest.approx(mechanism.acceleration(q, u), rel=1e-11)
-    infos = tuple(replace(info, locked=place in (1, 2)) for place, info in enumerate(mechanism.coordinates))
+    infos = tuple(replace(info, locked=index in (1, 2)) for index, info in enumerate(mechanism.coordinates))
     mechanism, still = replace(mechanism, coordinates=infos), np.array((1.0, 0.0, 0.0, 1.0))
     assert accelerations(mechanism, still * q, still * u) == pytest.approx(
         mechanism.acceleration(still * q, still * u), rel=1e-11
@@ -121,13 +121,13 @@ ALL: dict[str, Any] = {**MODELS, "prescribed": prescribed}
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
 @pytest.mark.parametrize("make", ALL.values(), ids=ALL)
 def test_same_motion_as_with_bullet(make: Any, accuracy: float):
-    found = []
+    result = []
     for engine in ("bullet", "compiled"):
         with Simulation(make(), engine) as simulation:
             names = [info.name for info in simulation.mechanism.coordinates if not info.locked]
             trajectory = simulation.run(1.0, accuracy=accuracy, initial_speeds={names[-1]: 2.0}, report_interval=0.05)
-            found.append(trajectory)
-    theirs, ours = found
+            result.append(trajectory)
+    theirs, ours = result
     assert ours.summary["constraints"] == theirs.summary["constraints"]
     for count in ("steps", "attempted_steps", "evaluations"):
         assert ours.summary[count] == theirs.summary[count]
@@ -171,9 +171,9 @@ def test_kernels_are_what_they_mean_in_python(make: Any):
     assert python.realize(0.0, y.tolist(), layout.ACCELERATION_STAGE) == layout.OK
     assert python.found() == engine.derivative(0.0, y)
     ends = run_many(engine, [y], 1e-30, accuracy=1e-8)
-    room, found = np.zeros(engine.structure[layout.WORK_SIZE]), np.zeros(len(y))
+    room, result = np.zeros(engine.structure[layout.WORK_SIZE]), np.zeros(len(y))
     room[layout.SCRATCH : layout.SCRATCH + 2] = 1e-9, np.inf
-    assert law_function("project")(python.program.ints, engine.numbers, room, y, found, 0) == layout.OK
+    assert law_function("project")(python.program.ints, engine.numbers, room, y, result, 0) == layout.OK
     assert y[: len(y) // 2].tolist() == ends.states[0][: len(y) // 2].tolist()
 
 
@@ -312,9 +312,9 @@ def test_equations_that_repeat_or_contradict_each_other(count: int, size: int, r
     values = rng.normal(size=count)
     a, room, x = np.zeros(ls.factor_room(count, size)), np.zeros(count), np.zeros(size)
     a[: count * size] = rows.ravel()
-    found = ls.factorise(count, size, a, 1e-9)
-    assert found == rank
-    ls.minimum_norm(count, size, a, found, values, room, x)
+    result = ls.factorise(count, size, a, 1e-9)
+    assert result == rank
+    ls.minimum_norm(count, size, a, result, values, room, x)
     expected = np.linalg.lstsq(rows, values, rcond=1e-9)[0]
     condition = (
         np.linalg.cond(rows)
@@ -322,9 +322,9 @@ def test_equations_that_repeat_or_contradict_each_other(count: int, size: int, r
         else np.linalg.norm(rows) * np.linalg.norm(np.linalg.pinv(rows, 1e-9))
     )
     assert np.abs(x - expected).max() < 1e-13 * max(1.0, condition) ** 2 * max(1.0, float(np.abs(expected).max()))
-    for place in range(rank, size):
+    for index in range(rank, size):
         free = np.zeros(size)
-        free[place] = 1.0
-        ls.apply_q(size, a, found, free)
+        free[index] = 1.0
+        ls.apply_q(size, a, result, free)
         assert np.linalg.norm(free) == pytest.approx(1.0, abs=1e-13)
         assert np.abs(rows @ free).max(initial=0.0) < 1e-12 * max(1.0, float(np.abs(rows).max()))

@@ -43,9 +43,9 @@ def states(mechanism, count):
     rng, size = np.random.default_rng(5), len(mechanism.coordinates)
     for _ in range(count):
         q, u = rng.uniform(-1.0, 1.0, size), rng.uniform(-2.0, 2.0, size)
-        for place, info in enumerate(mechanism.coordinates):
+        for index, info in enumerate(mechanism.coordinates):
             if info.locked:
-                q[place], u[place] = info.default_value, 0.0
+                q[index], u[index] = info.default_value, 0.0
         yield rng.uniform(0.0, 2.0), q.tolist(), u.tolist()
 
 
@@ -102,19 +102,19 @@ def test_force_does_something():
 def test_all_at_once():
     """Together they are the sum of each: no one's numbers are in another's place."""
     model = chain()
-    for place, (name, make) in enumerate(FORCES.items()):
+    for index, (name, make) in enumerate(FORCES.items()):
         made = make()
         if "actuator" in name or name in ("station", "path over obstacles"):
             continue  # others name them by a path
         for item in made if isinstance(made, tuple | list) else (made,):
-            item.name = f"{item.name}{place}"
+            item.name = f"{item.name}{index}"
             if isinstance(item, HuntCrossleyForce):
                 (parameters,) = item.contact_parameters.objects
-                parameters.geometry = tuple(f"{word}{place}" for word in parameters.geometry)
+                parameters.geometry = tuple(f"{word}{index}" for word in parameters.geometry)
             if isinstance(item, SmoothSphereHalfSpaceForce):
                 item.socket_half_space, item.socket_sphere = (
-                    f"/contactgeometryset/floor{place}",
-                    (f"/contactgeometryset/s2{place}"),
+                    f"/contactgeometryset/floor{index}",
+                    (f"/contactgeometryset/s2{index}"),
                 )
             model.add(item)
     mechanism, ours, theirs = engines(model)
@@ -126,8 +126,8 @@ def test_every_class_of_force_is_here():
     """But for what needs a file, and muscles and others with states of their own, which have tables of numbers."""
     made = {"ElasticFoundationForce", "ExternalForce"}
     for make in FORCES.values():
-        found = make()
-        made |= {type(item).__name__ for item in (found if isinstance(found, tuple | list) else (found,))}
+        result = make()
+        made |= {type(item).__name__ for item in (result if isinstance(result, tuple | list) else (result,))}
     kinds = [kind for kind in declared_kinds() if not (getattr(kind, "states", ()) or kind.component.since)]
     assert {kind.component.__name__ for kind in kinds if not issubclass(kind.component, Muscle)} <= made
 

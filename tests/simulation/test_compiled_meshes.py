@@ -19,11 +19,11 @@ from tests.simulation.test_compiled_forces import assert_same, engines, states
 
 def touching(surfaces) -> ElasticFoundationForce:
     force = ElasticFoundationForce(name="contact", transition_velocity=0.3)
-    for place, surface in enumerate(surfaces):
+    for index, surface in enumerate(surfaces):
         force.contact_parameters.objects.append(
             ElasticFoundationForce.ContactParameters(
                 geometry=(surface.name,),
-                stiffness=1e5 * (1 + place),
+                stiffness=1e5 * (1 + index),
                 dissipation=0.3,
                 static_friction=0.8,
                 dynamic_friction=0.4,
@@ -87,8 +87,8 @@ def test_a_motion(tmp_path):
         osimlite.simulate(model, 0.4, engine, accuracy=1e-8, folder=tmp_path) for engine in ("bullet", "compiled")
     )
     assert ours.values[-1] == pytest.approx(theirs.values[-1], abs=1e-6)
-    found, expected = (item.summary["contact_events"] for item in (ours, theirs))
-    assert [event["event"] for event in found] == [event["event"] for event in expected] != []
-    assert found[0]["time_s"] == pytest.approx(expected[0]["time_s"], abs=1e-7)
+    result, expected = (item.summary["contact_events"] for item in (ours, theirs))
+    assert [event["event"] for event in result] == [event["event"] for event in expected] != []
+    assert result[0]["time_s"] == pytest.approx(expected[0]["time_s"], abs=1e-7)
     name = "contact.egg.torque.Z"
     assert ours.forces[name] == pytest.approx(theirs.forces[name], abs=1e-3)

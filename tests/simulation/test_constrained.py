@@ -64,8 +64,8 @@ def test_bullet_and_our_recursion_agree_on_any_mechanism(case: Case, kind: str, 
     # An almost impossible demand makes any result uncertain.
     scale = max(1.0, float(np.abs(expected).max()), float(np.abs(u).max()) ** 2)
     assume(scale < 1e5)
-    found = accelerations(mechanism, case.q, u, 0.7)
-    assert np.abs(found - expected).max() < 1e-9 * scale
+    result = accelerations(mechanism, case.q, u, 0.7)
+    assert np.abs(result - expected).max() < 1e-9 * scale
 
 
 def knee(*, opensim_derivatives: bool, inertia: Any = None) -> Mechanism:
@@ -119,8 +119,8 @@ def test_routes_that_are_none_are_refused():
 # --------------------------------------------------------------------------------------------------- whole models
 def add(model: Model, name: str, joint: Any, carrier: Any, at=(0, 0, 0), **more: Any) -> Body:
     body = model.add(Body(name=name, mass=1.0, mass_center=(0.05, -0.2, 0.02), inertia=INERTIA))
-    for place, coordinate in enumerate(joint.coordinates):
-        coordinate.name = f"{name}{place}" if len(joint.coordinates) > 1 else name
+    for index, coordinate in enumerate(joint.coordinates):
+        coordinate.name = f"{name}{index}" if len(joint.coordinates) > 1 else name
     model.add(joint.between(carrier, body, at=at, **more))
     return body
 
@@ -237,8 +237,8 @@ def test_energy_is_kept_and_so_are_the_constraints(make: Any):
             assert np.abs(item.position_errors(state)).max(initial=0.0) < 1e-9
             rows, wanted = item.velocity_equations(state)
             assert np.abs(rows @ u - wanted).max() < 1e-9
-    for place, info in enumerate(mechanism.coordinates):
-        assert not info.locked or np.ptp(trajectory.values[:, place]) < 1e-9
+    for index, info in enumerate(mechanism.coordinates):
+        assert not info.locked or np.ptp(trajectory.values[:, index]) < 1e-9
 
 
 @pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)

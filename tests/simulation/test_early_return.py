@@ -57,8 +57,8 @@ def test_simbodys_early_return_behind_its_switch(positions, speeds, early_return
             [(positions[0], 0.04, 0), (positions[1], 0.04, 0), (0, 0, 0)], [0.05, 0.05, math.inf]
         )
     ]
-    found, energy = contact_forces([contacts[n] for n in order], 0.2, simbody_early_return=early_return)
-    expected = dict(zip(order, (force[1] - 9.80665 for force in found), strict=True))
+    result, energy = contact_forces([contacts[n] for n in order], 0.2, simbody_early_return=early_return)
+    expected = dict(zip(order, (force[1] - 9.80665 for force in result), strict=True))
     assert udot == pytest.approx([expected[0], expected[1]], rel=1e-9)
     assert stored == pytest.approx(energy, rel=1e-9)
     lost = early_return and any(speeds) and list(expected.values()).count(-9.80665) == 2

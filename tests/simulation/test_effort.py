@@ -22,12 +22,12 @@ def solved(
     frames, n, m = columns.shape
     sizes = np.array([frames, m, n, *[0] * (n * (m + 1))], dtype=np.int64)
     given = np.hstack([columns.reshape(frames, -1), wanted])
-    found = np.zeros((frames, n + m + 1))
+    result = np.zeros((frames, n + m + 1))
     code = code or best()
     code.make_ready(("least_effort",))
     numbers = np.concatenate([[power], low, high])
-    code.entry("least_effort")(sizes, numbers, given, found, np.zeros(effort_room(m, n)))
-    return found[:, :n], found[:, n:-1], found[:, -1]
+    code.entry("least_effort")(sizes, numbers, given, result, np.zeros(effort_room(m, n)))
+    return result[:, :n], result[:, n:-1], result[:, -1]
 
 
 def problem(random: Generator, m: int, n: int, frames: int = 1) -> tuple[Array, Array, Array, Array]:
@@ -67,7 +67,7 @@ def test_the_quadratic_problem() -> None:
 
 def by_others(columns: Array, wanted: Array, low: Array, high: Array, power: float, start: Array) -> float:
     """The least sum that SciPy finds."""
-    found = optimize.minimize(
+    result = optimize.minimize(
         lambda x: np.sum(np.abs(x) ** power),
         start,
         jac=lambda x: power * np.sign(x) * np.abs(x) ** (power - 1.0),
@@ -76,7 +76,7 @@ def by_others(columns: Array, wanted: Array, low: Array, high: Array, power: flo
         method="SLSQP",
         options={"maxiter": 500, "ftol": 1e-14},
     )
-    return float(found.fun) if found.success else np.inf
+    return float(result.fun) if result.success else np.inf
 
 
 @pytest.mark.parametrize("power", [1.5, 2.0, 3.0, 4.0, 10.0])

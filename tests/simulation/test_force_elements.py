@@ -54,9 +54,9 @@ def arm() -> Model:
 
 
 def path(*points) -> GeometryPath:
-    found = GeometryPath(name="path")
-    found.path_point_set.objects += points
-    return found
+    result = GeometryPath(name="path")
+    result.path_point_set.objects += points
+    return result
 
 
 def straight(*more) -> GeometryPath:

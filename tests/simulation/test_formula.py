@@ -68,9 +68,9 @@ LONG = 20_000
     ids=["sum", "difference", "power", "parentheses", "signs", "calls", "nested sums", "definitions"],
 )
 def test_no_length_and_no_depth_is_too_much(text, expected):
-    found = value(text)
+    result = value(text)
     # The power has a limit, where x = 0.7^x.
-    assert found == pytest.approx(0.7**found if expected is None else expected)
+    assert result == pytest.approx(0.7**result if expected is None else expected)
 
 
 @pytest.mark.parametrize(
@@ -104,10 +104,10 @@ def test_what_is_wrong_is_said(text, message):
 @given(st.text(alphabet="qu0123.e+-*/^(),; =sincoatl", max_size=30))
 def test_no_text_does_worse_than_a_model_error(text):
     try:
-        found = value(text)
+        result = value(text)
     except ModelError:
         return
-    assert isinstance(found, float)
+    assert isinstance(result, float)
 
 
 def test_every_function_is_a_law():
@@ -131,6 +131,6 @@ def assert_derivatives(text, q=0.7, u=-1.3, step=1e-6):
     for variable, (dq, du) in enumerate(((step, 0.0), (0.0, step))):
         steps, constants = program(formula.derivative(variable))
         count = len(steps) // 3
-        found = of_two(q, u, np.array([count, *steps]), np.array(constants), np.zeros(2 + count))
+        result = of_two(q, u, np.array([count, *steps]), np.array(constants), np.zeros(2 + count))
         expected = (value(text, q + dq, u + du) - value(text, q - dq, u - du)) / (2 * step)
-        assert found == pytest.approx(expected, rel=1e-8, abs=1e-9)
+        assert result == pytest.approx(expected, rel=1e-8, abs=1e-9)

@@ -80,10 +80,10 @@ def test_ellipsoid_against_another_integrator():
     before, after = start - first, second - end
     arc = length(paths, first, second) - np.linalg.norm(before) - np.linalg.norm(after)
     y = [*start, *(before / np.linalg.norm(before))]
-    found = integrate.solve_ivp(rates, (0.0, arc), y, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+    result = integrate.solve_ivp(rates, (0.0, arc), y, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
     assert weights @ start**2 == pytest.approx(1.0, abs=1e-10)
     assert (weights * start) @ before == pytest.approx(0.0, abs=1e-9)
-    assert found == pytest.approx([*end, *(after / np.linalg.norm(after))], abs=1e-9)
+    assert result == pytest.approx([*end, *(after / np.linalg.norm(after))], abs=1e-9)
     assert arc > 0.01
 
 
@@ -215,8 +215,8 @@ def test_only_the_piece_nearest_to_the_axis_is_held_on_a_side():
 
 def test_far_side_of_a_sphere():
     """Where OpenSim's length is negative."""
-    found = length(around(surface("Sphere", [0.04], "x")), (-0.039, 0.02, 0.0), (-0.039, -0.02, 0.001))
-    assert 0.18 < found < 0.25
+    result = length(around(surface("Sphere", [0.04], "x")), (-0.039, 0.02, 0.0), (-0.039, -0.02, 0.001))
+    assert 0.18 < result < 0.25
 
 
 def test_unknown_wrapping():

@@ -65,10 +65,10 @@ GIVEN = {
 @pytest.mark.parametrize(("given", "expected"), GIVEN.values(), ids=GIVEN)
 def test_what_a_control_may_be(ready, given, expected):
     """It adds to what the model does, and what nothing drives is 0; the run after it knows nothing of it."""
-    times, found = controls_of(ready, {"first": given, "/forceset/push_4": 1.0})
-    assert found == pytest.approx(np.array([0.5 + expected(times), 0.0 * times]), abs=1e-12)
-    times, found = controls_of(ready, None)
-    assert found.tolist() == [[0.5] * len(times), [0.0] * len(times)]
+    times, result = controls_of(ready, {"first": given, "/forceset/push_4": 1.0})
+    assert result == pytest.approx(np.array([0.5 + expected(times), 0.0 * times]), abs=1e-12)
+    times, result = controls_of(ready, None)
+    assert result.tolist() == [[0.5] * len(times), [0.0] * len(times)]
 
 
 def test_a_motion_is_that_of_a_controller_more(model, tmp_path):
@@ -166,8 +166,8 @@ def test_names_that_two_actuators_share(model):
 def test_tables_that_do_not_cover_the_motion(ready):
     message = "the controls are given from 0.1 to 0.2 s of a motion from 0 to 0.3 s; their first and last values hold"
     with pytest.warns(DoubtfulWarning, match=message):
-        times, found = controls_of(ready, {"second": ((0.1, 0.2), (1.0, 2.0)), "first": ((0.0, 0.3), (0.0, 0.0))})
-    assert found[1] == pytest.approx(np.interp(times, (0.1, 0.2), (1.0, 2.0)), abs=1e-12)
+        times, result = controls_of(ready, {"second": ((0.1, 0.2), (1.0, 2.0)), "first": ((0.0, 0.3), (0.0, 0.0))})
+    assert result[1] == pytest.approx(np.interp(times, (0.1, 0.2), (1.0, 2.0)), abs=1e-12)
 
 
 def test_a_table_source_that_does_not_cover_the_motion(model, tmp_path):

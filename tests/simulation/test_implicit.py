@@ -61,9 +61,9 @@ def test_condensed_equations_are_those_of_all_states(case):
     assert linearise(system.program.ints, system.numbers, system._w, y, f, room) == layout.OK
     assert condense(system.program.ints, c, room)
     right = np.random.default_rng(1).uniform(-1.0, 1.0, len(y))
-    found = right.copy()
-    correct(system.program.ints, c, room, found)
-    assert found == pytest.approx(np.linalg.solve(np.eye(len(y)) - c * jacobian, right), rel=1e-4, abs=1e-6)
+    result = right.copy()
+    correct(system.program.ints, c, room, result)
+    assert result == pytest.approx(np.linalg.solve(np.eye(len(y)) - c * jacobian, right), rel=1e-4, abs=1e-6)
 
 
 def rates_at(system: System, y: Any) -> Any:
@@ -111,12 +111,12 @@ def test_a_motion_that_explodes_is_an_error(method, accuracy, advice):
 def test_a_block_hangs_on_a_muscle(case, method):
     with Simulation(hanging(case), "compiled", equilibrate=True) as simulation:
         exact = simulation.run(0.3, accuracy=1e-9)
-        found = simulation.run(0.3, accuracy=1e-6, integrator=method)
-    assert found.summary["integrator"] == {"adams": "Adams", "bdf": "BDF", "rosenbrock": "Rosenbrock"}[method]
+        result = simulation.run(0.3, accuracy=1e-6, integrator=method)
+    assert result.summary["integrator"] == {"adams": "Adams", "bdf": "BDF", "rosenbrock": "Rosenbrock"}[method]
     # At every report: the interpolated motion too.
-    assert np.abs(found.values - exact.values).max() < 2e-5
+    assert np.abs(result.values - exact.values).max() < 2e-5
     for path, values in exact.auxiliary.items():
-        assert np.abs(found.auxiliary[path] - values).max() < 2e-5, path
+        assert np.abs(result.auxiliary[path] - values).max() < 2e-5, path
 
 
 @pytest.mark.parametrize(("number", "method"), [("m0001", "bdf"), ("m0001", "rosenbrock"), ("m0005", "adams")])
@@ -125,10 +125,10 @@ def test_real_models_move(number, method, corpus):
     (path,) = (model.path for model in corpus if model.id == number)
     with Simulation(osimlite.read(path), "compiled", equilibrate=True) as simulation:
         exact = simulation.run(0.05, accuracy=1e-8)
-        found = simulation.run(0.05, accuracy=1e-5, integrator=method)
-    assert np.abs(found.values - exact.values).max() < 1e-4
-    assert np.abs(found.speeds - exact.speeds).max() < 1e-2
-    assert found.summary["evaluations"] < exact.summary["evaluations"] / 2
+        result = simulation.run(0.05, accuracy=1e-5, integrator=method)
+    assert np.abs(result.values - exact.values).max() < 1e-4
+    assert np.abs(result.speeds - exact.speeds).max() < 1e-2
+    assert result.summary["evaluations"] < exact.summary["evaluations"] / 2
 
 
 def test_a_stiff_muscle_needs_few_evaluations():
@@ -145,17 +145,17 @@ def test_a_stiff_muscle_needs_few_evaluations():
 def test_constraints_hold(name, method):
     with Simulation(MODELS[name](), "compiled") as simulation:
         exact = simulation.run(0.3, accuracy=1e-8, report_interval=0.1)
-        found = simulation.run(0.3, accuracy=1e-5, report_interval=0.1, integrator=method)
-    assert np.abs(found.values - exact.values).max() < 1e-3
+        result = simulation.run(0.3, accuracy=1e-5, report_interval=0.1, integrator=method)
+    assert np.abs(result.values - exact.values).max() < 1e-3
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_contacts_begin_and_end(walker, method):
     with Simulation(walker, "compiled") as simulation:
         exact = simulation.run(0.6, accuracy=1e-7).summary["contact_events"]
-        found = simulation.run(0.6, accuracy=1e-4, integrator=method).summary["contact_events"]
-    assert [event["contact"] for event in found] == [event["contact"] for event in exact]
-    assert [event["time_s"] for event in found] == pytest.approx([event["time_s"] for event in exact], abs=1e-4)
+        result = simulation.run(0.6, accuracy=1e-4, integrator=method).summary["contact_events"]
+    assert [event["contact"] for event in result] == [event["contact"] for event in exact]
+    assert [event["time_s"] for event in result] == pytest.approx([event["time_s"] for event in exact], abs=1e-4)
 
 
 # ------------------------------------------------------------------------------------------------------- many in a call
@@ -191,8 +191,8 @@ def test_derivatives_that_became_too_large_end_no_iteration(method, accuracy):
     # The fiber pulls with e^40 of its force, and with less after each step: by as much derivatives become too large.
     model.find("/forceset/mu").default_fiber_length = 0.16
     with Simulation(model, "compiled") as simulation:
-        found, exact = (
+        result, exact = (
             simulation.run(0.1, accuracy=least, integrator=by).auxiliary["/forceset/mu/fiber_length"][-1]
             for least, by in ((accuracy, method), (1e-7, "rosenbrock"))
         )
-    assert found == pytest.approx(exact, abs=accuracy)
+    assert result == pytest.approx(exact, abs=accuracy)

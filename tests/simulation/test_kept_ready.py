@@ -132,11 +132,11 @@ def test_files_are_read_every_time(repo, tmp_path):
     model.add(osimlite.CoordinateActuator(name="motor", coordinate=coordinate.name, optimal_force=1.0))
     table = "controls\nversion=1\nnRows=2\nnColumns=2\ninDegrees=no\nendheader\ntime\tmotor\n0\t{0}\n1\t{0}\n"
     model.add(osimlite.PrescribedController(name="drive", controls_file="controls.sto"))
-    found = []
+    result = []
     for level in (0.0, 5.0):
         (tmp_path / "controls.sto").write_text(table.format(level))
-        found.append(osimlite.simulate(model, to=0.05, engine="compiled", folder=tmp_path).values)
-    assert not np.array_equal(*found)
+        result.append(osimlite.simulate(model, to=0.05, engine="compiled", folder=tmp_path).values)
+    assert not np.array_equal(*result)
 
 
 def test_threads_do_not_meet_in_one_model(repo):

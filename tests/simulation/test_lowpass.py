@@ -34,7 +34,7 @@ def test_one_row_is_no_motion():
 def test_a_slow_filter_keeps_its_digits() -> None:
     """Of what forty digits give, ten are kept, though the factors of a slow filter nearly cancel."""
     values = np.random.default_rng(5).normal(size=400).cumsum()
-    _, found = lowpassed(np.arange(400) / 600.0, values[:, None], 2.5)
+    _, result = lowpassed(np.arange(400) / 600.0, values[:, None], 2.5)
     continued = [*(2.0 * values[0] - values[200:0:-1]), *values, *(2.0 * values[-1] - values[-2:-202:-1])]
     with localcontext(prec=40):
         w = Decimal(np.tan(np.pi * 2.5 / 600.0))
@@ -48,4 +48,4 @@ def test_a_slow_filter_keeps_its_digits() -> None:
                 run.append((taken - sum(one * run[k - 1 - j] for j, one in enumerate(back))) / scale)
             rows = run[::-1]
     expected = np.array([float(row) for row in rows])
-    assert found[:, 0] == pytest.approx(expected, abs=1e-10 * np.abs(expected).max())
+    assert result[:, 0] == pytest.approx(expected, abs=1e-10 * np.abs(expected).max())

@@ -40,9 +40,9 @@ def test_default_start_is_the_simulation(engine, starts, walker):
     assert np.array_equal(runs.reports[0][:, : len(order)], trajectory.values[:, order])
     assert runs.counts[0].tolist() == [135, 173, 828]
     assert ENDINGS[int(runs.endings[0])] == "done"
-    found = [event for event in trajectory.summary["contact_events"] if event["time_s"] > 0.0]
-    assert [name for _, name, _ in runs.events[0]] == [event["contact"] for event in found]
-    assert [t for t, _, _ in runs.events[0]] == pytest.approx([event["time_s"] for event in found], abs=1e-9)
+    result = [event for event in trajectory.summary["contact_events"] if event["time_s"] > 0.0]
+    assert [name for _, name, _ in runs.events[0]] == [event["contact"] for event in result]
+    assert [t for t, _, _ in runs.events[0]] == pytest.approx([event["time_s"] for event in result], abs=1e-9)
     for name, (force, t) in zip(engine.contacts, runs.peaks[0].tolist(), strict=True):
         largest = trajectory.summary["largest_contact_forces"].get(name, {"force_N": 0.0, "time_s": 0.0})
         assert (force, t) == pytest.approx((largest["force_N"], largest["time_s"]))

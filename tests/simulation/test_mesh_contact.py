@@ -23,8 +23,8 @@ def thrown(folder, *, dissipation=0.0, friction=0.0) -> Model:
     model = Model(name="thrown")
     body = model.add(Body(name="egg", mass=1.0, inertia=(0.004, 0.006, 0.006, 0, 0, 0)))
     joint = PlanarJoint(name="flies")
-    for place, (name, value) in enumerate((("turn", 0.3), ("along", 0.15), ("height", 0.33))):
-        joint.coordinates[place].name, joint.coordinates[place].default_value = name, value
+    for index, (name, value) in enumerate((("turn", 0.3), ("along", 0.15), ("height", 0.33))):
+        joint.coordinates[index].name, joint.coordinates[index].default_value = name, value
     model.add(joint.between(model.ground, body))
     floor = ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0, 0, -np.pi / 2))
     stone = ContactMesh(name="stone", socket_frame=model.ground, filename="stone.obj")

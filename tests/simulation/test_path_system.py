@@ -38,8 +38,8 @@ def poses(paths):
 
 
 def test_lengths_are_those_of_each_pose(paths, poses):
-    found = paths.system.lengths(poses)
-    assert found.tolist() == [list(paths.lengths(q).values()) for q in poses]
+    result = paths.system.lengths(poses)
+    assert result.tolist() == [list(paths.lengths(q).values()) for q in poses]
 
 
 def test_one_path_is_measured_alone(paths, poses):
@@ -64,9 +64,9 @@ def test_the_length_on_the_far_side_of_a_sphere_is_negative(fixtures, code):
 
 def test_a_pose_that_cannot_be_computed_is_no_number_and_the_next_one_is(paths, poses):
     poses[1] = np.nan
-    found = paths.system.lengths(poses)
-    assert np.isnan(found[1]).all() and not np.isnan(found[2]).any()
-    assert found[2].tolist() == list(paths.lengths(poses[2]).values())
+    result = paths.system.lengths(poses)
+    assert np.isnan(result[1]).all() and not np.isnan(result[2]).any()
+    assert result[2].tolist() == list(paths.lengths(poses[2]).values())
 
 
 def test_paths_around_surfaces_share_the_mechanism(fixtures):

@@ -40,8 +40,8 @@ def test_muscles(name, shared):
             assert lengths[path] == pytest.approx(pose["length"][muscle], rel=0, abs=1e-12)
             assert speeds[path] == pytest.approx(pose["speed"][muscle], rel=0, abs=1e-10)
             expected = [pose["moment_arms"][muscle].get(of.rpartition("/")[2], 0.0) for of in table["coordinates"]]
-            found = [arms[path].get(of, 0.0) for of in table["coordinates"]]
-            assert found == pytest.approx(expected, rel=0, abs=1e-10)
+            result = [arms[path].get(of, 0.0) for of in table["coordinates"]]
+            assert result == pytest.approx(expected, rel=0, abs=1e-10)
 
 
 def test_a_pose_is_an_array_or_a_mapping():

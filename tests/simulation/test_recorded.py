@@ -104,8 +104,8 @@ def test_loads_without_a_document(tmp_path: Path) -> None:
     assert np.abs(wanted.rows - plain.rows).max() > 1.0
     columns = {"box": [("f1_", "p1_", "m1_")]}
     for file in (tmp_path / "plate.mot", plate):
-        found = osimlite.inverse_dynamics(model, motion, file, times=times, applied_to=columns)
-        assert found.rows == pytest.approx(wanted.rows, rel=1e-12, abs=1e-12)
+        result = osimlite.inverse_dynamics(model, motion, file, times=times, applied_to=columns)
+        assert result.rows == pytest.approx(wanted.rows, rel=1e-12, abs=1e-12)
     one = osimlite.inverse_dynamics(model, motion, plate, times=times, applied_to={"/bodyset/box": [("f1_",)]})
     two = osimlite.inverse_dynamics(model, motion, plate, times=times, applied_to={"box": [("f1_",), ("f1_",)]})
     assert two.rows - plain.rows == pytest.approx(2.0 * (one.rows - plain.rows), abs=1e-9)

@@ -225,8 +225,8 @@ def test_spinning_top_keeps_its_momentum():
     model = Model(name="top", gravity=(0.0, 0.0, 0.0))
     top = model.add(Body(name="top", mass=1.0, inertia=(1.0, 2.0, 2.5, 0.0, 0.0, 0.0)))
     joint = osimlite.BallJoint(name="ball")
-    for place, coordinate in enumerate(joint.coordinates):
-        coordinate.name = f"q{place}"
+    for index, coordinate in enumerate(joint.coordinates):
+        coordinate.name = f"q{index}"
     model.add(joint.between(model.ground, top))
     trajectory = osimlite.simulate(model, to=1.0, accuracy=1e-9, initial_speeds={"q0": 1.0, "q1": 0.1, "q2": 0.2})
     momenta = [

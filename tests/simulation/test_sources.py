@@ -40,10 +40,10 @@ def edited(function, **parts):
 def test_an_edited_function_concerns_those_that_call_it(changed):
     reflect = least_squares.reflect
     constants = tuple(0.5 if item == 0.0 else item for item in reflect.__code__.co_consts)
-    found = changed(least_squares, "reflect", edited(reflect, co_consts=constants))
+    result = changed(least_squares, "reflect", edited(reflect, co_consts=constants))
     # `project` solves by the addresses of these laws.
     paths = {"cable_path", "geodesic_path"}
-    assert found == {"factorise_law", "minimum_norm_law", "constrained_dynamics", "fit_frames", *paths}
+    assert result == {"factorise_law", "minimum_norm_law", "constrained_dynamics", "fit_frames", *paths}
 
 
 def test_a_changed_number_concerns_those_that_use_it(changed):

@@ -52,7 +52,7 @@ def test_nearest_points():
     places = rng.uniform(-0.7, 0.7, (200, 3))
     # Straight out of edges and corners, where several triangles are equally near.
     places = np.concatenate([places, 1.3 * mesh.points, 0.9 * mesh.points])
-    found, inside = mesh.nearest(places)
+    result, inside = mesh.nearest(places)
     size = np.linalg.norm(places, axis=1)
     sure = np.abs(size - 0.5) > 0.02
     assert np.array_equal(inside[sure], size[sure] < 0.5)
@@ -60,7 +60,7 @@ def test_nearest_points():
     edges = 0.5 * (mesh.corners + np.roll(mesh.corners, 1, axis=1)).reshape(-1, 3)
     some = np.concatenate([mesh.points, mesh.centroids, edges])
     nearest = np.linalg.norm(places[:, None] - some, axis=2).min(axis=1)
-    distance = np.linalg.norm(found - places, axis=1)
+    distance = np.linalg.norm(result - places, axis=1)
     assert np.all(distance <= nearest + 1e-12)
     assert np.abs(distance - np.abs(size - 0.5)).max() < 0.02
 

@@ -16,7 +16,7 @@ def largest_error(trajectory, reference):
     table = reference("trajectory")
     assert trajectory.times == pytest.approx(table["time"], abs=1e-12)
     return max(
-        np.abs(trajectory.values[:, place] - table[name]).max() for place, name in enumerate(trajectory.coordinates)
+        np.abs(trajectory.values[:, index] - table[name]).max() for index, name in enumerate(trajectory.coordinates)
     )
 
 
@@ -123,10 +123,10 @@ def test_events_do_not_depend_on_accuracy_more_than_the_motion_does(precise, sim
 
 
 def test_largest_forces(precise):
-    found = {name: entry["force_N"] for name, entry in precise.summary["largest_contact_forces"].items()}
+    result = {name: entry["force_N"] for name, entry in precise.summary["largest_contact_forces"].items()}
     # OpenSim's largest at full milliseconds.
     sampled = {"RFootForce": 333.916, "LFootForce": 180.838, "LKneeForce": 508.834, "RKneeForce": 443.186}
-    assert found.keys() == sampled.keys()
+    assert result.keys() == sampled.keys()
     for name, size in sampled.items():
-        assert size - 0.1 < found[name] < size + 4.0
-    assert found["RFootForce"] == pytest.approx(333.916, abs=1e-3)
+        assert size - 0.1 < result[name] < size + 4.0
+    assert result["RFootForce"] == pytest.approx(333.916, abs=1e-3)

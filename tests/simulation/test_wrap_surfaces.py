@@ -63,5 +63,5 @@ def test_surface(name, code):
 
 @pytest.mark.parametrize("height", [1e200, np.nan])
 def test_a_helix_beyond_all_numbers_stays(height):
-    found = settled((1.0, 1.0, 0.0), (-1.0, 1.0, height), (1.0, 0.0, 0.0), (-1.0, 0.0, height), 3.0, 3.0)
-    assert found == pytest.approx((0.0, height), nan_ok=True)
+    result = settled((1.0, 1.0, 0.0), (-1.0, 1.0, height), (1.0, 0.0, 0.0), (-1.0, 0.0, height), 3.0, 3.0)
+    assert result == pytest.approx((0.0, height), nan_ok=True)

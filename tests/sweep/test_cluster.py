@@ -75,10 +75,10 @@ class Cluster:
 
 def wait_for(what, words, seconds=120):
     deadline = time.monotonic() + seconds
-    while not (found := what()):
+    while not (result := what()):
         assert time.monotonic() < deadline, f"waited for {words}"
         time.sleep(0.02)
-    return found
+    return result
 
 
 @pytest.fixture(scope="module")

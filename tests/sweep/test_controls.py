@@ -63,33 +63,33 @@ CURVES = {
 @pytest.mark.parametrize("interpolation", CURVES)
 def test_nodes_make_a_curve(interpolation):
     rows = [(0.1, 0.9, 0.2, 0.7), (0.0, 0.3, 1.0, 0.4)]
-    found = runs(pulled(), {"mu/control@0:0.03:4": (0.0, 1.0)}, *rows, interpolation=interpolation)
-    for ours, row in zip(found, rows, strict=True):
+    result = runs(pulled(), {"mu/control@0:0.03:4": (0.0, 1.0)}, *rows, interpolation=interpolation)
+    for ours, row in zip(result, rows, strict=True):
         assert ours == pytest.approx(ends(pulled(), mu=CURVES[interpolation](row)), rel=1e-9)
-    assert abs(found[0][1] - found[1][1]) > 1e-3
+    assert abs(result[0][1] - result[1][1]) > 1e-3
 
 
 def test_nodes_hold_their_values_outside():
-    (found,) = runs(pulled(), {"mu/control@0.02,0.01": (0.0, 1.0)}, (0.1, 0.9))
-    assert found == pytest.approx(ends(pulled(), mu=((0.0, 0.01, 0.02, 0.03), (0.9, 0.9, 0.1, 0.1))), rel=1e-9)
+    (result,) = runs(pulled(), {"mu/control@0.02,0.01": (0.0, 1.0)}, (0.1, 0.9))
+    assert result == pytest.approx(ends(pulled(), mu=((0.0, 0.01, 0.02, 0.03), (0.9, 0.9, 0.1, 0.1))), rel=1e-9)
 
 
 def test_switches_may_pass_each_other():
     vary = {"motor/control@switch1": (0.0, TO), "motor/control@switch2": (0.0, TO), "motor/control": (-1.0, 1.0)}
-    found = runs(pulled(), vary, (0.01, 0.02, 0.5), (0.02, 0.01, 0.5), (0.01, 0.01, 0.5))
+    result = runs(pulled(), vary, (0.01, 0.02, 0.5), (0.02, 0.01, 0.5), (0.01, 0.01, 0.5))
     on = PiecewiseConstantFunction(x=(0.0, 0.01, 0.02), y=(0.5, 1.5, 0.5))
-    assert found[0] == found[1] == pytest.approx(ends(pulled(), motor=on), rel=1e-9)
-    assert found[2] == pytest.approx(ends(pulled(), motor=0.5), rel=1e-9)
+    assert result[0] == result[1] == pytest.approx(ends(pulled(), motor=on), rel=1e-9)
+    assert result[2] == pytest.approx(ends(pulled(), motor=0.5), rel=1e-9)
 
 
 def test_what_drives_an_actuator_is_scaled_and_moved():
     """What the model does itself, and what all runs are given, by the same factor."""
     table = (np.array(TIMES), np.array([0.0, 0.4, 0.1, 0.2]))
     vary = {"mu/control@scale": (0.0, 2.0), "mu/control": (-1.0, 1.0)}
-    (found,) = runs(pulled(), vary, (1.5, 0.1), controls={"mu": table, "motor": 0.2})
+    (result,) = runs(pulled(), vary, (1.5, 0.1), controls={"mu": table, "motor": 0.2})
     given = 1.5 * table[1] + 0.1
     wanted = ends(hung_with_motor(excitation=0.45), mu=(TIMES, given), motor=0.2)
-    assert found == pytest.approx(wanted, rel=1e-9)
+    assert result == pytest.approx(wanted, rel=1e-9)
 
 
 def hung_with_motor(excitation):
@@ -101,23 +101,23 @@ def hung_with_motor(excitation):
 
 def test_several_names_are_one_variable():
     for name in ("m*/control@0:0.03:2", "mu,motor/control@0,0.03", "/forceset/m?,/forceset/motor/control@0:0.03:2"):
-        (found,) = runs(pulled(), {name: (0.0, 1.0)}, (0.5, 0.3))
+        (result,) = runs(pulled(), {name: (0.0, 1.0)}, (0.5, 0.3))
         both = {name: ((0.0, 0.03), (0.5, 0.3)) for name in ("mu", "motor")}
-        assert found == pytest.approx(ends(pulled(), **both), rel=1e-9)
+        assert result == pytest.approx(ends(pulled(), **both), rel=1e-9)
 
 
 def test_muscles_and_reflexes_have_numbers_too():
     model = pulled()
     model.add(ToyReflexController(name="reflex", gain=0.0, socket_actuators=("/forceset/mu",)))
     vary = {"mu/max_isometric_force@scale": (0.5, 2.0), "reflex/gain": (0.0, 5.0), "x/speed": (0.0, 1.0)}
-    found = runs(model, vary, (1.5, 3.0, 0.5), (1.0, 0.0, 0.5))
-    for (scale, gain, speed), ours in zip([(1.5, 3.0, 0.5), (1.0, 0.0, 0.5)], found, strict=True):
+    result = runs(model, vary, (1.5, 3.0, 0.5), (1.0, 0.0, 0.5))
+    for (scale, gain, speed), ours in zip([(1.5, 3.0, 0.5), (1.0, 0.0, 0.5)], result, strict=True):
         own = pulled()
         own.add(ToyReflexController(name="reflex", gain=gain, socket_actuators=("/forceset/mu",)))
         own.tree().by_path["/forceset/mu"].max_isometric_force *= scale
         own.tree().by_path["/jointset/slide/x"].default_speed_value = speed
         assert ours == ends(own)
-    assert found[0][2] > 1.01 * found[1][2]
+    assert result[0][2] > 1.01 * result[1][2]
 
 
 def test_files_of_other_controllers_are_read_once(tmp_path):
@@ -131,21 +131,21 @@ def test_files_of_other_controllers_are_read_once(tmp_path):
     runner = Runner(made)
     runner.run(np.array([[0.1, 0.2]]))
     table.unlink()
-    found = runner.run(np.array([[0.3, 0.6]]))
-    assert found.status == ["done"], found.reasons
+    result = runner.run(np.array([[0.3, 0.6]]))
+    assert result.status == ["done"], result.reasons
     wanted = ends(pulled(), motor=((0.0, 0.03), (0.4, 0.712)))
-    assert [found.measures[name][0] for name in ENDS] == pytest.approx(wanted, rel=1e-9)
+    assert [result.measures[name][0] for name in ENDS] == pytest.approx(wanted, rel=1e-9)
 
 
 def test_the_model_that_is_written_does_the_same(tmp_path):
     vary = {"m*/control@0:0.03:3": (0.0, 1.0), "motor/control@switch1": (0.0, TO), "mu/control@scale": (0.5, 2.0)}
     row, given = (0.2, 0.9, 0.4, 0.01, 1.7), {"motor": 0.1}
-    (found,) = runs(pulled(), vary, row, controls=given)
+    (result,) = runs(pulled(), vary, row, controls=given)
     variants = Variants(plan(pulled(), vary, to=TO, controls=given))
     variants.put(row)
     osimlite.write(variants.model, tmp_path / "best.osim")
     best = osimlite.read(tmp_path / "best.osim")
-    assert ends(best) == pytest.approx(found, rel=1e-12)
+    assert ends(best) == pytest.approx(result, rel=1e-12)
     # It can be varied again.
     Variants(plan(best, vary, controls=given))
 
@@ -215,10 +215,10 @@ def test_what_is_chosen_for_a_simulation_is_of_each_run(choice):
     model.ground.wrap_object_set.objects.append(egg)
     model.tree().by_path["/forceset/mu"].geometry_path.path_wrap_set.objects.append(PathWrap(wrap_object="egg"))
     vary = {"mu/control@0:0.03:2": (0.0, 1.0), "mu/max_isometric_force": (300.0, 600.0)}
-    (found,) = runs(model, vary, (0.2, 0.6, 500.0), **choice)
+    (result,) = runs(model, vary, (0.2, 0.6, 500.0), **choice)
     model.tree().by_path["/forceset/mu"].max_isometric_force = 500.0
     with Simulation(model, "compiled", **choice) as simulation:
         run = simulation.run(TO, accuracy=1e-7, controls={"mu": ((0.0, 0.03), (0.2, 0.6))})
-    assert found[:2] == pytest.approx([run.values[-1, 0], run.speeds[-1, 0]], rel=1e-9)
+    assert result[:2] == pytest.approx([run.values[-1, 0], run.speeds[-1, 0]], rel=1e-9)
     (usual,) = runs(model, vary, (0.2, 0.6, 500.0))
-    assert found[:2] != usual[:2]
+    assert result[:2] != usual[:2]

@@ -35,11 +35,11 @@ def test_they_are_of_the_columns_of_a_simulation():
         "mu/control": lambda run: np.full(len(run.times), 0.3),
         "time": lambda run: run.times,
     }
-    found = measured(model, *(f"{what}({name})" for name in names for what in ("max", "min", "end")), to=0.055)
+    result = measured(model, *(f"{what}({name})" for name in names for what in ("max", "min", "end")), to=0.055)
     with Simulation(model, "compiled") as simulation:
         run = simulation.run(0.055, initial={"x": 0.345}, report_interval=0.01)
     wanted = [number for of in names.values() for number in (of(run).max(), of(run).min(), of(run)[-1])]
-    assert found == pytest.approx(wanted, rel=1e-12, abs=1e-300)
+    assert result == pytest.approx(wanted, rel=1e-12, abs=1e-300)
 
 
 @pytest.mark.parametrize("engine", ["compiled", "bullet"])
@@ -50,7 +50,7 @@ def test_places_of_bodies_and_the_mass_center(walker, engine):
     vary |= {"LeftShank/mass_center/1": (-0.2, 0.2), "platform_rz": (-0.1, 0.0)}
     row = (0.5, 0.3, 2.0, 4.0, 0.15, -0.05)
     made = plan(walker, vary, measures=tuple(f"end({name})" for name in names), to=0.1, engine=engine)
-    found = [value[0] for value in Runner(made).run(np.array([row])).measures.values()]
+    result = [value[0] for value in Runner(made).run(np.array([row])).measures.values()]
     walker.tree().by_path["/bodyset/Pelvis"].mass = 4.0
     walker.tree().by_path["/bodyset/LeftShank"].mass_center = shank = (0.0, 0.15, 0.0)
     walker.tree().by_path["/jointset/PlatformToGround/platform_rz"].default_value = -0.05
@@ -65,7 +65,7 @@ def test_places_of_bodies_and_the_mass_center(walker, engine):
         mechanism.station_velocity("Pelvis", walker.tree().by_path["/bodyset/Pelvis"].mass_center, q, u)[0],
         -0.05,
     ]
-    assert found == pytest.approx(wanted, rel=1e-12 if engine == "compiled" else 1e-7)
+    assert result == pytest.approx(wanted, rel=1e-12 if engine == "compiled" else 1e-7)
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def effort(run):
 
 
 def test_functions_look_at_the_same():
-    (found,) = (
+    (result,) = (
         Runner(plan(pulled(), {"x": (0.0, 1.0)}, measures=(effort,), to=0.05, report_interval=0.01))
         .run(np.array([[0.345]]))
         .measures.values()
@@ -101,7 +101,7 @@ def test_functions_look_at_the_same():
     with Simulation(pulled(), "compiled") as simulation:
         run = simulation.run(0.05, initial={"x": 0.345}, report_interval=0.01)
     wanted = (run.auxiliary["/forceset/mu/activation"] * run.forces["mu"]).sum()
-    assert wanted > 0.0 and found[0] == pytest.approx(wanted, rel=1e-12)
+    assert wanted > 0.0 and result[0] == pytest.approx(wanted, rel=1e-12)
 
 
 def test_a_run_that_is_stopped_is_looked_at_up_to_its_end(walker):

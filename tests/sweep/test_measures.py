@@ -28,8 +28,8 @@ def test_against_the_summary_of_a_simulation(walker):
         column = list(trajectory.coordinates).index
         summary = trajectory.summary
         energies = summary["energy_J"]
-        found = {name: values[number] for name, values in block.measures.items()}
-        assert found == {
+        result = {name: values[number] for name, values in block.measures.items()}
+        assert result == {
             "distance": trajectory.values[-1, column("Pelvis_tx")] - trajectory.values[0, column("Pelvis_tx")],
             "energy": pytest.approx(energies["end"]["total"] - energies["start"]["total"], abs=1e-9),
             "largest_force": max(item["force_N"] for item in summary["largest_contact_forces"].values()),

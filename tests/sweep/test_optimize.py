@@ -51,29 +51,29 @@ def test_methods_find_the_bottom_of_a_bowl(method):
 
 
 def test_the_best_model_does_what_was_found(made, tmp_path):
-    found = optimize(made, DISTANCE, tmp_path / "new" / "folder", budget=40, popsize=8, seed=2)
-    table = pq.read_table(found.history).to_pydict()
+    result = optimize(made, DISTANCE, tmp_path / "new" / "folder", budget=40, popsize=8, seed=2)
+    table = pq.read_table(result.history).to_pydict()
     assert table["evaluation"] == list(range(40)) and table["batch"] == [k // 8 for k in range(40)]
-    assert found.value == max(table["distance"]) and found.evaluation == table["distance"].index(found.value)
+    assert result.value == max(table["distance"]) and result.evaluation == table["distance"].index(result.value)
     for name, (low, high) in VARY.items():
         assert all(low <= x <= high for x in table[name])
-        assert table[name][found.evaluation] == found.values[name]
+        assert table[name][result.evaluation] == result.values[name]
     assert all(force >= 0.0 for force in table["largest_force"])
-    best = osimlite.read(found.model)
-    assert best.tree().by_path["/bodyset/Pelvis"].mass == found.values["/bodyset/Pelvis/mass"]
+    best = osimlite.read(result.model)
+    assert best.tree().by_path["/bodyset/Pelvis"].mass == result.values["/bodyset/Pelvis/mass"]
     with Simulation(best, "compiled") as simulation:
         trajectory = simulation.run(0.5)
     values = trajectory.values[:, list(trajectory.coordinates).index("Pelvis_tx")]
-    assert values[-1] - values[0] == found.value
+    assert values[-1] - values[0] == result.value
     summary = json.loads((tmp_path / "new" / "folder" / SUMMARY).read_text())
-    assert summary["value"] == found.value and summary["settings"]["seed"] == 2
+    assert summary["value"] == result.value and summary["settings"]["seed"] == 2
     assert sorted(path.name for path in (tmp_path / "new" / "folder").iterdir()) == sorted((HISTORY, BEST, SUMMARY))
 
 
 def test_it_begins_where_the_model_is(made, tmp_path):
-    found = optimize(made, DISTANCE, tmp_path, method="cma", budget=20, popsize=20, sigma=1e-9)
+    result = optimize(made, DISTANCE, tmp_path, method="cma", budget=20, popsize=20, sigma=1e-9)
     start = {"RHip_rz": np.radians(30.0), "Pelvis_tx/speed": 0.0, "/bodyset/Pelvis/mass": 1.0}
-    assert found.values == pytest.approx(start, abs=1e-6)
+    assert result.values == pytest.approx(start, abs=1e-6)
 
 
 def test_it_begins_where_another_search_has_ended(made, walker, tmp_path):
@@ -88,8 +88,8 @@ def test_it_begins_where_another_search_has_ended(made, walker, tmp_path):
 
 def test_it_looks_around_from_where_the_model_is(made, tmp_path):
     """The model as it is comes first, then points all over the ranges; what follows begins at the best of them."""
-    found = optimize(made, DISTANCE, tmp_path, method="sobol-cma", budget=40, popsize=8, sigma=1e-6, seed=3)
-    table = pq.read_table(found.history).to_pydict()
+    result = optimize(made, DISTANCE, tmp_path, method="sobol-cma", budget=40, popsize=8, sigma=1e-6, seed=3)
+    table = pq.read_table(result.history).to_pydict()
     rows = np.array([table[name] for name in VARY]).T
     assert rows[0] == pytest.approx([np.radians(30.0), 0.0, 1.0])
     low, high = np.array(list(VARY.values())).T
@@ -195,8 +195,8 @@ def test_only_a_finite_number_is_the_best(made, walker, tmp_path):
 
 def test_ranges_may_be_left_if_asked(walker, tmp_path):
     made = plan(walker, {"Pelvis_tx/speed": (0.0, 0.1), "RHip_rz": (0.4, 0.6)}, to=0.3)
-    found = optimize(made, DISTANCE, tmp_path, budget=40, popsize=8, is_bounded=False, sigma=1.0)
-    assert found.values["Pelvis_tx/speed"] > 0.2
+    result = optimize(made, DISTANCE, tmp_path, budget=40, popsize=8, is_bounded=False, sigma=1.0)
+    assert result.values["Pelvis_tx/speed"] > 0.2
 
 
 def test_parameters_begin_at_their_defaults(tmp_path):
@@ -205,17 +205,17 @@ def test_parameters_begin_at_their_defaults(tmp_path):
 
     vary = {"slope": (5.0, 15.0), "thigh_length": (0.3, 0.6)}
     made = plan(make, vary, parameters={"slope": 10.0, "thigh_length": 0.4}, to=0.3)
-    found = optimize(made, DISTANCE, tmp_path, method="cma", budget=6, popsize=6, sigma=1e-6)
-    assert found.values == pytest.approx({"slope": 10.0, "thigh_length": 0.4}, abs=1e-3)
-    assert osimlite.to_text(dynamic_walker(**found.values)) == found.model.read_text()
+    result = optimize(made, DISTANCE, tmp_path, method="cma", budget=6, popsize=6, sigma=1e-6)
+    assert result.values == pytest.approx({"slope": 10.0, "thigh_length": 0.4}, abs=1e-3)
+    assert osimlite.to_text(dynamic_walker(**result.values)) == result.model.read_text()
 
 
 def test_failed_runs_are_worse_than_all_others(walker, tmp_path):
     path = "/forceset/RFootForce/contact_parameters/stiffness"
     made = plan(walker, {path: (-1e6, 1e6), "RHip_rz": (0.4, 0.6)}, to=0.2)
-    found = optimize(made, DISTANCE, tmp_path / "a", budget=24, popsize=8, start=[0.0, 0.5], seed=1)
-    table = pq.read_table(found.history).to_pydict()
-    assert "failed" in table["status"] and table["status"][found.evaluation] == "done"
+    result = optimize(made, DISTANCE, tmp_path / "a", budget=24, popsize=8, start=[0.0, 0.5], seed=1)
+    table = pq.read_table(result.history).to_pydict()
+    assert "failed" in table["status"] and table["status"][result.evaluation] == "done"
     with pytest.raises(SimulationError, match=r"no run came to its end: .*RFootForce"):
         optimize(
             plan(walker, {path: (-2.0, -1.0), "RHip_rz": (0.4, 0.6)}, to=0.2),

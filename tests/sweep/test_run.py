@@ -68,11 +68,13 @@ def test_processes_of_bullet_too(walker, tmp_path):
 
 def test_settings_are_in_the_file(made, tmp_path):
     chosen = samples(made.variables, "lhs", 5, 3)
-    found = settings_of(sweep(made, chosen, tmp_path / "r.parquet").path)
-    assert found["sampler"] == "lhs" and found["samples"] == 5 and found["seed"] == 3
-    assert found["vary"][0] == {"name": "RHip_rz", "low": 0.3, "high": 0.7}
-    assert found["vary"][1]["log"] is True
-    assert found["engine"] == "compiled" and found["to"] == 0.3 and found["measures"] == ["distance", "largest_force"]
+    result = settings_of(sweep(made, chosen, tmp_path / "r.parquet").path)
+    assert result["sampler"] == "lhs" and result["samples"] == 5 and result["seed"] == 3
+    assert result["vary"][0] == {"name": "RHip_rz", "low": 0.3, "high": 0.7}
+    assert result["vary"][1]["log"] is True
+    assert (
+        result["engine"] == "compiled" and result["to"] == 0.3 and result["measures"] == ["distance", "largest_force"]
+    )
 
 
 class Stopper:
@@ -232,7 +234,7 @@ def test_damaged_batches_are_computed_again_and_said(interrupted_three_times, tm
     (said,) = caplog.messages
     assert "r.parquet.partial' is damaged or cut off" in said and f"first {outcome.before} run" in said
     assert (outcome.before == 0) == (batch == 1)
-    assert [found.name for found in tmp_path.iterdir()] == ["r.parquet"]
+    assert [result.name for result in tmp_path.iterdir()] == ["r.parquet"]
 
 
 def test_undamaged_work_is_gone_on_with_in_silence(interrupted_three_times, tmp_path, caplog):
@@ -249,7 +251,7 @@ def test_work_damaged_at_its_beginning_is_refused(interrupted_three_times, tmp_p
     (tmp_path / "r.parquet.partial").write_bytes(damaged)
     with pytest.raises(SettingError, match=r"r\.parquet\.partial' is no interrupted sweep, or is damaged"):
         sweep(made, chosen, tmp_path / "r.parquet", resume=True)
-    assert [found.name for found in tmp_path.iterdir()] == ["r.parquet.partial"]
+    assert [result.name for result in tmp_path.iterdir()] == ["r.parquet.partial"]
     assert (tmp_path / "r.parquet.partial").read_bytes() == damaged
 
 
@@ -262,7 +264,7 @@ def test_what_is_damaged_during_the_work_makes_no_results(tmp_path):
     with pytest.raises(OsimliteError, match="was damaged meanwhile; go on with --resume"):
         partial.finish()
     partial.close()
-    assert [found.name for found in tmp_path.iterdir()] == ["r.partial"]
+    assert [result.name for result in tmp_path.iterdir()] == ["r.partial"]
 
 
 def test_damaged_results_are_told(tmp_path):

@@ -49,12 +49,12 @@ def simulated(model, initial, speeds, to=0.6):
     with Simulation(model, "compiled") as simulation:
         trajectory = simulation.run(to, initial=initial, initial_speeds=speeds)
     columns = list(trajectory.coordinates)
-    found = []
+    result = []
     for name in STATES:
         coordinate, _, what = name.partition("/")
         table = trajectory.values if what == "value" else trajectory.speeds
-        found.append(table[-1, columns.index(coordinate)])
-    return found
+        result.append(table[-1, columns.index(coordinate)])
+    return result
 
 
 def changed(chosen, values):
@@ -249,11 +249,11 @@ def test_models_of_another_structure_are_measured_as_they_are(engine):
     assert block.status == ["done"] * 4
     for number, (links, swing, speed) in enumerate(rows):
         with Simulation(chain({"links": links}), engine) as simulation:
-            found = simulation.run(0.4, initial={"q0": swing}, initial_speeds={"x": speed})
-        x, q = (found.coordinates.index(name) for name in ("x", "q0"))
-        assert block.measures["distance"][number] == found.values[-1, x]
-        assert block.measures["q0/value"][number] == found.values[-1, q]
-        assert block.measures["x/speed"][number] == found.speeds[-1, x]
+            result = simulation.run(0.4, initial={"q0": swing}, initial_speeds={"x": speed})
+        x, q = (result.coordinates.index(name) for name in ("x", "q0"))
+        assert block.measures["distance"][number] == result.values[-1, x]
+        assert block.measures["q0/value"][number] == result.values[-1, q]
+        assert block.measures["x/speed"][number] == result.speeds[-1, x]
         assert abs(block.measures["energy"][number]) < 0.01
 
 

@@ -25,27 +25,27 @@ THREE = (variable("a", -1.0, 2.0, 4), variable("b", 1e3, 1e6, 3, is_log=True), v
 
 @given(st.sampled_from(SAMPLERS), st.integers(1, 200), st.integers(0, 5), st.lists(st.integers(0, 200), max_size=4))
 def test_any_pieces_make_the_whole(sampler, count, seed, cuts):
-    found = Samples(THREE, sampler, 12 if sampler == "grid" else count, seed)
-    whole = found.block(0, found.count)
-    assert whole.shape == (found.count, 3)
-    ends = sorted({0, found.count, *(cut for cut in cuts if cut < found.count)})
-    pieces = [found.block(a, b - a) for a, b in pairwise(ends)]
+    result = Samples(THREE, sampler, 12 if sampler == "grid" else count, seed)
+    whole = result.block(0, result.count)
+    assert whole.shape == (result.count, 3)
+    ends = sorted({0, result.count, *(cut for cut in cuts if cut < result.count)})
+    pieces = [result.block(a, b - a) for a, b in pairwise(ends)]
     assert np.array_equal(np.concatenate(pieces), whole)
     assert (whole >= [item.low for item in THREE]).all() and (whole <= [item.high for item in THREE]).all()
 
 
 @given(st.sampled_from(SAMPLERS), st.lists(st.tuples(st.integers(0, 100), st.integers(1, 100)), max_size=6))
 def test_pieces_come_in_any_order(sampler, pieces):
-    found = Samples(THREE, sampler, 12 if sampler == "grid" else 150, 1)
-    whole = Samples(THREE, sampler, found.count, 1).block(0, found.count)
+    result = Samples(THREE, sampler, 12 if sampler == "grid" else 150, 1)
+    whole = Samples(THREE, sampler, result.count, 1).block(0, result.count)
     for first, count in pieces:
-        assert np.array_equal(found.block(first, count), whole[first : first + count])
+        assert np.array_equal(result.block(first, count), whole[first : first + count])
 
 
 def test_grid_has_every_combination_and_both_ends():
-    found = samples(THREE)
-    assert found.sampler == "grid" and found.count == 12
-    rows = found.block(0, 100)
+    result = samples(THREE)
+    assert result.sampler == "grid" and result.count == 12
+    rows = result.block(0, 100)
     assert len({tuple(row) for row in rows}) == 12
     assert sorted(set(rows[:, 0])) == [-1.0, 0.0, 1.0, 2.0]
     assert sorted(set(rows[:, 1])) == pytest.approx([1e3, 10**4.5, 1e6], rel=1e-12)
@@ -81,9 +81,9 @@ def test_sobol_is_scipys_own():
 def test_a_block_of_many_needs_no_more_memory_than_the_block():
     import tracemalloc
 
-    found = Samples((variable("a"), variable("b")), "lhs", 10**12)
+    result = Samples((variable("a"), variable("b")), "lhs", 10**12)
     tracemalloc.start()
-    assert found.block(10**11, 100).shape == (100, 2)
+    assert result.block(10**11, 100).shape == (100, 2)
     assert tracemalloc.get_traced_memory()[1] < 1e6
     tracemalloc.stop()
 

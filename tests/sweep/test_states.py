@@ -86,9 +86,9 @@ def test_runs_may_start_in_equilibrium(engine):
     block = Runner(made).run(values)
     assert block.status == ["done"] * 3 + ["failed"]
     assert "no equilibrium was found of '/forceset/mu', whose path of 5 m is 4.68 m longer" in block.reasons[3]
-    for place, (x, length, activation) in enumerate(values[:3]):
+    for index, (x, length, activation) in enumerate(values[:3]):
         force = muscle("thelen_default", tendon_slack_length=length, default_activation=activation)
         with Simulation(hung(force, [0.3, 0.3]), engine) as simulation:
             alone = simulation.run(0.02, accuracy=1e-6, initial={"x": x}, equilibrate=True)
-        found = alone.auxiliary["/forceset/mu/fiber_length"][-1]
-        assert block.measures["/forceset/mu/fiber_length"][place] == pytest.approx(found, rel=1e-12)
+        result = alone.auxiliary["/forceset/mu/fiber_length"][-1]
+        assert block.measures["/forceset/mu/fiber_length"][index] == pytest.approx(result, rel=1e-12)

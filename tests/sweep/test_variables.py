@@ -46,8 +46,8 @@ def test_controls():
     model = dynamic_walker()
     model.add(CoordinateActuator(name="motor", coordinate="RHip_rz"))
     for name in ("motor/control", "/forceset/motor/control"):
-        (found,) = variables({name: "-1:1"}, model, build_mechanism(model))
-        assert found.target == Control(("/forceset/motor",))
+        (result,) = variables({name: "-1:1"}, model, build_mechanism(model))
+        assert result.target == Control(("/forceset/motor",))
     with pytest.raises(SettingError, match="'motor' is an actuator: vary 'motor/control', or"):
         variables({"motor": "0:1"}, model, build_mechanism(model), {})
     with pytest.raises(SettingError, match="did you mean 'motor/control'"):
@@ -57,9 +57,9 @@ def test_controls():
 
 
 def test_several_numbers_by_one_path():
-    found = one("/forceset/*Foot*/contact_parameters/stiffness", "1e5:1e7:3:log")
-    assert [place.component for place in found.target.places] == ["/forceset/RFootForce", "/forceset/LFootForce"]
-    assert (found.low, found.high, found.count, found.is_log) == (1e5, 1e7, 3, True)
+    result = one("/forceset/*Foot*/contact_parameters/stiffness", "1e5:1e7:3:log")
+    assert [place.component for place in result.target.places] == ["/forceset/RFootForce", "/forceset/LFootForce"]
+    assert (result.low, result.high, result.count, result.is_log) == (1e5, 1e7, 3, True)
 
 
 def test_every_number_that_is_found_can_be_set_and_read():

@@ -44,20 +44,20 @@ def walks_of(made, rows):
 def test_progress_counts_steps_before_the_first_scuff(walker, vary):
     rows = points(vary)
     made = plan(walker, vary, measures=("progress", "steps"), to=2.0, is_planted=True, accuracy=1e-5)
-    found = Runner(made).run(rows).measures["progress"]
+    result = Runner(made).run(rows).measures["progress"]
     _, walks = walks_of(made, rows)
-    assert found.astype(int).tolist() == [walk.clean_steps for walk in walks]
-    assert len(set(np.round(found, 6))) == len(rows)
-    parts = found - found.astype(int)
+    assert result.astype(int).tolist() == [walk.clean_steps for walk in walks]
+    assert len(set(np.round(result, 6))) == len(rows)
+    parts = result - result.astype(int)
     assert (parts > 0.0).all() and max(walk.clean_steps for walk in walks) > 0
 
 
 def test_progress_tells_how_near_the_next_step_was(walker):
     rows = points(VARY, 200)
     made = plan(walker, VARY, measures=("progress",), to=2.0, is_planted=True)
-    found = Runner(made).run(rows).measures["progress"]
+    result = Runner(made).run(rows).measures["progress"]
     _, walks = walks_of(made, rows)
-    scuffed = [(value, walk) for value, walk in zip(found.tolist(), walks, strict=True) if walk.scuffs]
+    scuffed = [(value, walk) for value, walk in zip(result.tolist(), walks, strict=True) if walk.scuffs]
     assert len(scuffed) > 20
     for value, walk in scuffed:
         first = walk.scuffs[0]
@@ -103,13 +103,13 @@ def test_the_best_model_starts_on_its_feet(walker, tmp_path):
 def test_feet_may_be_given(walker):
     """With a knee in the part of a foot, a knee on the ground does not end the walk."""
     rows = points(VARY, 8)
-    found = {}
+    result = {}
     for feet in (None, ("RFootForce", "LFootForce"), ("RFootForce + RKneeForce", "LFootForce + LKneeForce")):
         made = plan(walker, VARY, measures=("time_to_fall", "scuffs"), to=1.5, is_planted=True, feet=feet)
         block = Runner(made).run(rows)
-        found[feet] = [column.tolist() for column in block.measures.values()]
+        result[feet] = [column.tolist() for column in block.measures.values()]
         assert made.settings()["feet"] == (None if feet is None else list(feet))
-    by_structure, named, knees = found.values()
+    by_structure, named, knees = result.values()
     assert named == by_structure
     assert all(later >= fell for later, fell in zip(knees[0], named[0], strict=True)) and knees[0] != named[0]
 

@@ -74,10 +74,10 @@ def laid_out(folder: Path) -> Path:
 
 def number(text: str, random: random.Random) -> str:
     """One number becomes something else."""
-    found = list(re.finditer(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?(?![\w.])", text))
-    if not found:
+    result = list(re.finditer(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?(?![\w.])", text))
+    if not result:
         return text
-    one = random.choice(found)
+    one = random.choice(result)
     return text[: one.start()] + random.choice(WORDS) + text[one.end() :]
 
 
@@ -120,11 +120,11 @@ def columns_gone(text: str, random: random.Random) -> str:
     """A marker or a coordinate that vanishes for a while."""
     lines = text.splitlines()
     column, first = random.randrange(1, 12), random.randrange(len(lines))
-    for place in range(first, min(len(lines), first + random.choice((1, 5, 1000)))):
-        cells = lines[place].split("\t")
+    for index in range(first, min(len(lines), first + random.choice((1, 5, 1000)))):
+        cells = lines[index].split("\t")
         if len(cells) > column + 3:
             cells[column : column + 3] = ["", "", ""]
-            lines[place] = "\t".join(cells)
+            lines[index] = "\t".join(cells)
     return "\n".join(lines) + "\n"
 
 
@@ -145,18 +145,18 @@ def every_second(text: str, random: random.Random) -> str:
 
 def name_lost(text: str, random: random.Random) -> str:
     """A file, a marker or a body that is called otherwise."""
-    found = list(re.finditer(r">([^<>\s][^<>\n]*)<", text))
-    if not found:
+    result = list(re.finditer(r">([^<>\s][^<>\n]*)<", text))
+    if not result:
         return text
-    one = random.choice(found)
+    one = random.choice(result)
     return text[: one.start(1)] + random.choice((*LOST, one[1] + "x", one[1][1:])) + text[one.end(1) :]
 
 
 def tag_lost(text: str, random: random.Random) -> str:
-    found = list(re.finditer(r"<(/?\w+)", text))
-    if not found:
+    result = list(re.finditer(r"<(/?\w+)", text))
+    if not result:
         return text
-    one = random.choice(found)
+    one = random.choice(result)
     return text[: one.start(1)] + one[1] + random.choice("xs1") + text[one.end(1) :]
 
 

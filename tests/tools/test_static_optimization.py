@@ -48,10 +48,10 @@ def written(file: Path, tmp_path: Path) -> tuple[StoTable, list[str]]:
 
 def test_a_walk_is_solved_exactly(walk: Path, reference: Path, tmp_path: Path) -> None:
     exact = np.load(reference / "so_gait10" / "qp.npz")
-    found = osimlite.run(walk)
-    assert found.done
-    x = found.tables[ACTIVATION].rows
-    assert found.tables[ACTIVATION].columns == tuple(exact["names"])
+    result = osimlite.run(walk)
+    assert result.done
+    x = result.tables[ACTIVATION].rows
+    assert result.tables[ACTIVATION].columns == tuple(exact["names"])
     assert x == pytest.approx(exact["x"], abs=2e-5)
     assert x[:, :18] == pytest.approx(exact["x"][:, :18], abs=1e-6)
     assert (exact["lo"] <= x).all()
@@ -62,7 +62,7 @@ def test_a_walk_is_solved_exactly(walk: Path, reference: Path, tmp_path: Path) -
     assert (np.sum(x**2, axis=1) <= np.sum(theirs.rows**2, axis=1)).all()
     assert (walk.parent / "Results" / ACTIVATION).read_text().splitlines()[: len(head)] == head
     forces, head = written(reference / "so_gait10" / "force.sto.gz", tmp_path)
-    ours = found.tables[FORCE]
+    ours = result.tables[FORCE]
     assert (walk.parent / "Results" / FORCE).read_text().splitlines()[: len(head)] == head
     # Each force for the activation that OpenSim found.
     assert ours.rows[:, :18] / x[:, :18] * theirs.rows[:, :18] == pytest.approx(forces.rows[:, :18], abs=1e-8)
@@ -71,10 +71,10 @@ def test_a_walk_is_solved_exactly(walk: Path, reference: Path, tmp_path: Path) -
 
 
 def test_controls_are_those_that_a_controller_reads(walk: Path) -> None:
-    found = osimlite.run(walk)
+    result = osimlite.run(walk)
     document = osimlite.read_document(walk.parent / "Results" / "walk_StaticOptimization_controls.xml")
     curves = {curve.name: [(node.t, node.value) for node in curve.x_nodes] for curve in document.objects}
-    table = found.tables[ACTIVATION]
+    table = result.tables[ACTIVATION]
     assert list(curves) == list(table.columns)
     for name, nodes in curves.items():
         assert nodes == list(zip(table.times, table[name], strict=True))
@@ -92,15 +92,15 @@ def test_what_has_no_solution_is_told_and_not_written(walk: Path) -> None:
         if muscle.name in ("vasti_r", "rect_fem_r"):
             muscle.max_isometric_force = 1.0
     osimlite.write(model, walk.parents[1] / "subject01.osim")
-    found = osimlite.run(walk, check=False)
-    table, forces = found.tables[ACTIVATION], found.tables[FORCE]
+    result = osimlite.run(walk, check=False)
+    table, forces = result.tables[ACTIVATION], result.tables[FORCE]
     failed = np.isnan(table.rows).all(axis=1)
-    assert not found.done
+    assert not result.done
     assert 0 < np.count_nonzero(failed) < failed.size
-    assert found.summary["StaticOptimization_unsolved"] == np.count_nonzero(failed)
+    assert result.summary["StaticOptimization_unsolved"] == np.count_nonzero(failed)
     assert np.isnan(table.rows).any(axis=1).tolist() == failed.tolist()
     assert np.isnan(forces.rows[failed, :28]).all()
-    assert "lack" in (said := dict(found.told)["StaticOptimization"])
+    assert "lack" in (said := dict(result.told)["StaticOptimization"])
     assert "knee_angle_r" in said
     document = osimlite.read_document(walk.parent / "Results" / "walk_StaticOptimization_controls.xml")
     assert {len(curve.x_nodes) for curve in document.objects} == {np.count_nonzero(~failed)}

@@ -122,9 +122,9 @@ def test_names_that_are_too_long_are_told(trial: Path, place: str) -> None:
 def test_nothing_is_computed_from_what_an_earlier_run_has_left(trial: Path, workers: int) -> None:
     """With -o a motion goes elsewhere, and there is an old one where the forces are computed from."""
     done = run("run", "id.xml", "z_ik.xml", "-o", "new", "--workers", workers, "--json", folder=trial)
-    found = {item["setup"]: item for item in json.loads(done.out)}
-    assert done.code == 2 and found["z_ik.xml"]["status"] == "done" and found["id.xml"]["status"] == "not run"
-    assert found["id.xml"]["message"] == "it needs what z_ik.xml makes, and -o puts that elsewhere; leave out -o"
+    result = {item["setup"]: item for item in json.loads(done.out)}
+    assert done.code == 2 and result["z_ik.xml"]["status"] == "done" and result["id.xml"]["status"] == "not run"
+    assert result["id.xml"]["message"] == "it needs what z_ik.xml makes, and -o puts that elsewhere; leave out -o"
     assert not (trial / "new" / "id").exists() and (trial / "new" / "z_ik" / "ik.mot").is_file()
 
 

@@ -87,13 +87,13 @@ class Reader:
 
     def mimicked(self, values: Mapping[str, float]) -> dict[str, float]:
         """Values of joints that mimic others, by the URDF, from those of their leaders."""
-        found = {}
+        result = {}
         for joint in self.root.iterfind("joint"):
             mimic = joint.find("mimic")
             if mimic is not None:
                 slope, start = float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))
-                found[joint.get("name", "")] = slope * values[mimic.get("joint", "")] + start
-        return found
+                result[joint.get("name", "")] = slope * values[mimic.get("joint", "")] + start
+        return result
 
     def body_poses(self, q):
         """Pose (4, 4) in ground of every body, by path."""

@@ -67,12 +67,12 @@ def test_contact_geometry_becomes_collision_shapes_where_it_is(surfaces):
 
 
 def test_what_collision_shapes_do_not_say_is_told(surfaces):
-    found = {(record.kind, record.component): record for record in surfaces.fidelity}
+    result = {(record.kind, record.component): record for record in surfaces.fidelity}
     place = "/contactgeometryset"
-    done = {name: found["contact-geometry", f"{place}/{name}"].done for name in ("floor", "roll", "bone", "loose")}
+    done = {name: result["contact-geometry", f"{place}/{name}"].done for name in ("floor", "roll", "bone", "loose")}
     assert "box of 1 x 200 x 200 m" in done["floor"] and done["roll"] == "left out" == done["loose"]
     assert "convex hull" in done["bone"]
-    assert "neither beside the model" in found["mesh", f"{place}/lost"].done
+    assert "neither beside the model" in result["mesh", f"{place}/lost"].done
     assert surfaces.fidelity.translated[f"{place}/foot"] == "collision of link block"
     assert unaccounted(with_surfaces(), surfaces) == []
 

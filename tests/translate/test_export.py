@@ -41,10 +41,10 @@ from tests.translate.evaluator import Reader
 
 def kinds(urdf: Urdf) -> dict[str, list[str]]:
     """Components by kind of record."""
-    found: dict[str, list[str]] = {}
+    result: dict[str, list[str]] = {}
     for record in urdf.fidelity:
-        found.setdefault(record.kind, []).append(record.component)
-    return found
+        result.setdefault(record.kind, []).append(record.component)
+    return result
 
 
 def unaccounted(model: Model, urdf: Urdf) -> list[str]:
@@ -76,15 +76,15 @@ def test_every_component_of_the_walker_is_accounted_for():
     model = dynamic_walker()
     urdf = to_urdf(model)
     assert unaccounted(model, urdf) == []
-    found = kinds(urdf)
-    assert found["force"] == [c.path for c in model.components() if isinstance(c, Force)]
-    assert found["contact-geometry"] == [c.path for c in model.components() if isinstance(c, ContactGeometry)]
-    assert found["locked"] == ["/jointset/PlatformToGround/platform_rz"]
+    result = kinds(urdf)
+    assert result["force"] == [c.path for c in model.components() if isinstance(c, Force)]
+    assert result["contact-geometry"] == [c.path for c in model.components() if isinstance(c, ContactGeometry)]
+    assert result["locked"] == ["/jointset/PlatformToGround/platform_rz"]
     moving = [c.path for c in model.components() if isinstance(c, Coordinate) and not c.locked]
-    assert found["coordinate-range"] == moving
-    assert found["default-pose"] == [path for path in moving if model[path].default_value != 0.0]
-    assert found["gravity"] == ["/"]
-    assert len(found["ellipsoid"]) == 4
+    assert result["coordinate-range"] == moving
+    assert result["default-pose"] == [path for path in moving if model[path].default_value != 0.0]
+    assert result["gravity"] == ["/"]
+    assert len(result["ellipsoid"]) == 4
     assert urdf.fidelity.translated["/jointset/RightThighToPelvis/RHip_rz"] == "joint RHip_rz"
     assert urdf.fidelity.translated["/ground"] == "link world"
 
@@ -155,10 +155,10 @@ def test_impossible_inertia_and_names_and_frames_are_told():
     frame = PhysicalOffsetFrame(name="spot", socket_parent="/bodyset/LeftShank", translation=(0.1, 0.0, 0.0))
     model.add(frame, Marker(name="m", socket_parent_frame="/bodyset/LeftShank"))
     urdf = to_urdf(model)
-    found = kinds(urdf)
-    assert found["inertia"] == ["/bodyset/RightShank"]
-    assert found["name"] == ["/bodyset/Pel:vis"]
-    assert found["frame"] == ["/componentset/spot"] and found["marker"] == ["/markerset/m"]
+    result = kinds(urdf)
+    assert result["inertia"] == ["/bodyset/RightShank"]
+    assert result["name"] == ["/bodyset/Pel:vis"]
+    assert result["frame"] == ["/componentset/spot"] and result["marker"] == ["/markerset/m"]
     assert urdf.fidelity.translated["/bodyset/Pel:vis"] == "link Pel_vis"
     assert unaccounted(model, urdf) == []
 
@@ -234,11 +234,11 @@ def test_what_cannot_be_drawn_is_told():
         Sphere(radius=0.1, appearance=outlined),
     )
     urdf = to_urdf(model)
-    found = kinds(urdf)
-    assert found["hidden-visual"] == ["/bodyset/block/block_geom_1"]
-    assert found["visual"] == ["/bodyset/block/block_geom_2"]
-    assert found["mesh"] == ["/bodyset/block/block_geom_3", "/bodyset/block/block_geom_4"]
-    assert found["appearance"] == ["/bodyset/block/block_geom_5"]
+    result = kinds(urdf)
+    assert result["hidden-visual"] == ["/bodyset/block/block_geom_1"]
+    assert result["visual"] == ["/bodyset/block/block_geom_2"]
+    assert result["mesh"] == ["/bodyset/block/block_geom_3", "/bodyset/block/block_geom_4"]
+    assert result["appearance"] == ["/bodyset/block/block_geom_5"]
     details = [record for record in urdf.fidelity if record.kind == "mesh"]
     assert [record.detail for record in details] == ["bone.vtp", "gone.obj"] and "--geometry" in details[0].done
     # A row of the table tells of all files that are not there.

@@ -158,8 +158,8 @@ def test_every_function_is_written_exactly(function, arguments):
 
 def test_no_function_is_forgotten():
     def below(cls) -> set[type]:
-        found = {cls} if not getattr(cls, "__abstractmethods__", None) else set()
-        return found.union(*(below(item) for item in cls.__subclasses__()))
+        result = {cls} if not getattr(cls, "__abstractmethods__", None) else set()
+        return result.union(*(below(item) for item in cls.__subclasses__()))
 
     ours = {cls for cls in below(Function) if cls.__module__.startswith("osimlite.multibody")}
     # An error of Simbody's accelerations is no part of a pose.

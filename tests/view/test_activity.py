@@ -63,5 +63,5 @@ def test_a_file_of_states_has_them(tmp_path):
     mechanism = build_mechanism(walker)
     labels = [f"{mechanism.coordinates[0].path}/value", "/forceset/a/activation", "/forceset/a/fiber_length"]
     write_sto(tmp_path / "a.sto", "a", (0.0, 1.0), labels, ((0.1, 0.3, 0.2), (0.2, 0.4, 0.2)))
-    found = read_recording(walker, mechanism, tmp_path / "a.sto").auxiliary
-    assert {label: column.tolist() for label, column in found.items()} == {labels[1]: [0.3, 0.4]}
+    result = read_recording(walker, mechanism, tmp_path / "a.sto").auxiliary
+    assert {label: column.tolist() for label, column in result.items()} == {labels[1]: [0.3, 0.4]}

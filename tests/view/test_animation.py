@@ -142,8 +142,8 @@ def test_meshes_beside_the_file_are_drawn(tmp_path):
     pelvis.attach(Mesh(mesh_file="sheet.obj"))
     options = {"size": SMALL, "fps": 2}
     (without, _), *_ = frames(animate(model, motion, tmp_path / "a.gif", **options))
-    (found, _), *_ = frames(animate(model, motion, tmp_path / "b.gif", file=tmp_path / "walker.osim", **options))
-    assert (without != found).any(axis=2).sum() > 1000
+    (result, _), *_ = frames(animate(model, motion, tmp_path / "b.gif", file=tmp_path / "walker.osim", **options))
+    assert (without != result).any(axis=2).sum() > 1000
 
 
 def test_a_model_without_coordinates_has_a_film_too(tmp_path):

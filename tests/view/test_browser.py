@@ -97,10 +97,10 @@ def test_lines_go_where_the_scene_says(file_of, open_page, tmp_path):
     q = mechanism.values({"knee_angle_r": -1.8, "hip_flexion_r": 0.9, "ankle_angle_l": 0.3})
     page.run("v.show(x)", q.tolist())
     bodies, moved = scene.at(q), 0
-    for place, expected in enumerate(bodies.lines):
-        corners = np.array(page.run("v.mechanism.corners(x, v.q, v.stage.poses)", place)).reshape(-1, 3)
+    for index, expected in enumerate(bodies.lines):
+        corners = np.array(page.run("v.mechanism.corners(x, v.q, v.stage.poses)", index)).reshape(-1, 3)
         assert corners.shape == expected.shape and np.abs(corners - expected).max() < 1e-12
-        moved += not scene.lines[place].body
+        moved += not scene.lines[index].body
     assert moved > 5
 
 
@@ -114,8 +114,8 @@ def test_paths_run_along_geodesics_on_request(shared, open_page, tmp_path):
     lines = {wrapping: view.scene.at(view.q).lines for wrapping, view in pages.items()}
     page = open_page(pages["geodesic"].write_page(tmp_path / "page.html"))
     differing = 0
-    for place, (usual, expected) in enumerate(zip(*lines.values(), strict=True)):
-        corners = np.array(page.run("v.mechanism.corners(x, v.q, v.stage.poses)", place)).reshape(-1, 3)
+    for index, (usual, expected) in enumerate(zip(*lines.values(), strict=True)):
+        corners = np.array(page.run("v.mechanism.corners(x, v.q, v.stage.poses)", index)).reshape(-1, 3)
         assert corners.shape == expected.shape and np.abs(corners - expected).max() < 1e-9
         differing += usual.shape != expected.shape or np.abs(usual - expected).max() > 1e-3
     assert differing > 3
@@ -132,10 +132,12 @@ def test_the_page_has_lengths_and_moment_arms_of_paths(shared, open_page, tmp_pa
     # Of knees that move the patella along, of hips, and of what is not crossed.
     for coordinate in ("knee_angle_r", "hip_flexion_r", "ankle_angle_l"):
         place = mechanism.coordinate_index(coordinate)
-        found = page.run("x[1].map((k) => v.mechanism.routes.over(k, x[0], v.mechanism, v.q))", [place, [*range(80)]])
+        result = page.run("x[1].map((k) => v.mechanism.routes.over(k, x[0], v.mechanism, v.q))", [place, [*range(80)]])
         path = mechanism.coordinates[place].path
-        assert [item["length"] for item in found] == pytest.approx([lengths[name] for name in names], abs=1e-12)
-        assert [item["arm"] for item in found] == pytest.approx([arms[name].get(path, 0.0) for name in names], abs=1e-8)
+        assert [item["length"] for item in result] == pytest.approx([lengths[name] for name in names], abs=1e-12)
+        assert [item["arm"] for item in result] == pytest.approx(
+            [arms[name].get(path, 0.0) for name in names], abs=1e-8
+        )
 
 
 def test_a_muscle_that_is_clicked_shows_its_curves(file_of, open_page, tmp_path):

@@ -39,11 +39,11 @@ class Read:
         entry = self.parts["accessors"][number]
         view = self.parts["bufferViews"][entry["bufferView"]]
         kind = {5126: "<f4", 5125: "<u4"}[entry["componentType"]]
-        found = np.frombuffer(self.buffer, kind, view["byteLength"] // 4, view["byteOffset"])
-        return found.reshape(entry["count"], WIDTHS[entry["type"]])
+        result = np.frombuffer(self.buffer, kind, view["byteLength"] // 4, view["byteOffset"])
+        return result.reshape(entry["count"], WIDTHS[entry["type"]])
 
     def nodes(self, name: str) -> list[int]:
-        return [place for place, node in enumerate(self.parts["nodes"]) if node["name"] == name]
+        return [index for index, node in enumerate(self.parts["nodes"]) if node["name"] == name]
 
     def placed(self, place: int, moment: int) -> Any:
         """The matrix (4, 4) of a node in the scene at a moment."""
@@ -89,12 +89,12 @@ def test_bodies_and_shapes_move(tmp_path):
     for moment in (0, 11, 30):
         q = [np.interp(times[moment], motion.times, column) for column in values.T]
         bodies = scene.at(np.array(q))
-        for place, body in enumerate(scene.mechanism.bodies):
+        for index, body in enumerate(scene.mechanism.bodies):
             (node,) = read.nodes(body.name)
-            assert np.abs(read.placed(node, moment) - bodies.matrix(place, np.eye(4))).max() < 1e-5
+            assert np.abs(read.placed(node, moment) - bodies.matrix(index, np.eye(4))).max() < 1e-5
         for item in scene.drawn():
             shown = [read.placed(node, moment) for node in read.nodes(item.path)]
-            assert min(np.abs(found - bodies.matrix(item.body, item.matrix)).max() for found in shown) < 1e-4
+            assert min(np.abs(result - bodies.matrix(item.body, item.matrix)).max() for result in shown) < 1e-4
     # Between two moments players go the straight way, which is the short one for neighbours in sign.
     for channel, sampler in zip(*(read.parts["animations"][0][what] for what in ("channels", "samplers")), strict=True):
         if channel["target"]["path"] == "rotation":

@@ -72,14 +72,14 @@ def page(chromium):
 def test_functions_give_the_same(page):
     code = as_javascript([branches], [loops, spread])
     cases = [[a, b] for a in (-1.5, 0.5, 2.0, 12.0) for b in (0.5, 1.0, 7.0, 9.25)]
-    found = page.evaluate(f"{json.dumps(cases)}.map(([a, b]) => ({code}).laws[1](a, b))")
-    assert found == [branches(a, b) for a, b in cases]
+    result = page.evaluate(f"{json.dumps(cases)}.map(([a, b]) => ({code}).laws[1](a, b))")
+    assert result == [branches(a, b) for a, b in cases]
     cases = [[count, start] for count in (0, 1, 3, 9) for start in (0.0, -2.5, 40.0)]
-    found = page.evaluate(f"{json.dumps(cases)}.map(([a, b]) => ({code}).loops(a, b))")
-    assert found == [loops(count, start) for count, start in cases]
+    result = page.evaluate(f"{json.dumps(cases)}.map(([a, b]) => ({code}).loops(a, b))")
+    assert result == [loops(count, start) for count, start in cases]
     code = as_javascript([], [pointers])
-    found = page.evaluate(f"[1, 2, 4].map((k) => ({code}).pointers(new Float64Array([0, 1, 2, 3, 4, 5]), k))")
-    assert found == [pointers(np.arange(6.0), k) for k in (1, 2, 4)]
+    result = page.evaluate(f"[1, 2, 4].map((k) => ({code}).pointers(new Float64Array([0, 1, 2, 3, 4, 5]), k))")
+    assert result == [pointers(np.arange(6.0), k) for k in (1, 2, 4)]
 
 
 def test_what_is_not_known_is_an_error():

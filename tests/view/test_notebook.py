@@ -65,11 +65,14 @@ def test_meshes_are_found_beside_the_file(tmp_path: Path):
 
 
 def test_findings_are_a_table_the_worst_first():
-    found = [Finding("OSIM508", "limit", Severity.INFO, "a < b"), Finding("OSIM101", "x", Severity.ERROR, "no", "f", 3)]
-    html = Report(found)._repr_html_()
+    result = [
+        Finding("OSIM508", "limit", Severity.INFO, "a < b"),
+        Finding("OSIM101", "x", Severity.ERROR, "no", "f", 3),
+    ]
+    html = Report(result)._repr_html_()
     assert html.index("OSIM101") < html.index("OSIM508")
     assert "1 error, 0 warnings, 1 remark" in html and "f:3" in html and "a &lt; b" in html
-    many = Report(found * 200)._repr_html_()
+    many = Report(result * 200)._repr_html_()
     assert "and 200 more" in many and many.count("<tr>") == notebook.MOST_ROWS + 1
 
 

@@ -28,8 +28,8 @@ def walker(**more) -> Shown:
 
 
 def data_of(text: str):
-    (found,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
-    return json.loads(found)
+    (result,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
+    return json.loads(result)
 
 
 def test_the_page_holds_everything_and_asks_for_nothing(tmp_path: Path):

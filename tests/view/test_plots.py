@@ -120,7 +120,7 @@ def test_other_forces_leave_out_what_never_acts():
 
 def test_long_notes_leave_the_panels_their_width():
     motion = stroll()
-    motion.forces |= {f"a_muscle_that_rests_{place}": np.zeros(len(motion.times)) for place in range(60)}
+    motion.forces |= {f"a_muscle_that_rests_{index}": np.zeros(len(motion.times)) for index in range(60)}
     figure = drawn("other_forces.png", motion)
     (panel,), sheet = figure.axes, figure.bbox
     (note,) = panel.texts
@@ -131,7 +131,7 @@ def test_long_notes_leave_the_panels_their_width():
 
 
 def test_states_of_a_kind_share_panels_and_probes_have_theirs():
-    muscles = {f"/forceset/m{place}": np.full(12, place) for place in range(9)}
+    muscles = {f"/forceset/m{index}": np.full(12, index) for index in range(9)}
     states = {f"{path}/{kind}": column for path, column in muscles.items() for kind in ("activation", "fiber_length")}
     motion = stroll(12)
     motion.auxiliary = states
@@ -163,14 +163,14 @@ def test_energy_of_a_simulation_has_what_contacts_store():
     pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     trajectory = simulate(dynamic_walker(), 0.1)
     (panel,) = dict(_figures(trajectory, trajectory.mechanism))["energy.png"].axes
-    found = lines(panel)
-    assert set(found) == {"kinetic", "potential of gravity", STORED, "sum"}
+    result = lines(panel)
+    assert set(result) == {"kinetic", "potential of gravity", STORED, "sum"}
     stored, total = (trajectory.energy[part] for part in ("stored", "total"))
-    assert found[STORED].get_ydata() == pytest.approx(stored) and stored[0] > 1.0
-    assert found["sum"].get_ydata() == pytest.approx(total)
+    assert result[STORED].get_ydata() == pytest.approx(stored) and stored[0] > 1.0
+    assert result["sum"].get_ydata() == pytest.approx(total)
     # The table of the command says the same.
     said = trajectory.summary["energy_J"]
-    assert found["sum"].get_ydata()[[0, -1]] == pytest.approx([said["start"]["total"], said["end"]["total"]])
+    assert result["sum"].get_ydata()[[0, -1]] == pytest.approx([said["start"]["total"], said["end"]["total"]])
     assert [text.get_text() for text in panel.texts] == ["gravity: zero at the origin of the ground"]
 
 

@@ -78,8 +78,8 @@ def trials(tmp_path: Path) -> Path:
 def data_of(page: str) -> list[dict[str, Any]]:
     """The data of the viewers in a page."""
     inner = [html.unescape(text) for text in re.findall(r'srcdoc="([^"]*)"', page)]
-    found = [re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S) for text in inner]
-    return [json.loads(match[1]) for match in found if match]
+    result = [re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S) for text in inner]
+    return [json.loads(match[1]) for match in result if match]
 
 
 def test_a_page_for_two_trials_needs_nothing_else(trials: Path) -> None:

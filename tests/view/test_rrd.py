@@ -19,34 +19,34 @@ from tests.view.motions import stroll
 def read(path: Path) -> dict[str, dict[str, Any]]:
     """What a recording has: by entity and component, a row for each moment."""
     chunk = pytest.importorskip("rerun.chunk", reason="needs rerun-sdk (extra 'rerun')")
-    found: dict[str, dict[str, Any]] = {}
+    result: dict[str, dict[str, Any]] = {}
     for part in chunk.RrdReader(path).stream().to_chunks():
-        found.setdefault(part.entity_path, {}).update(part.to_record_batch().to_pydict())
-    return found
+        result.setdefault(part.entity_path, {}).update(part.to_record_batch().to_pydict())
+    return result
 
 
 def test_bodies_and_forces_are_where_the_scene_has_them(tmp_path: Path):
     motion = stroll(11)
     shown = Shown.of(dynamic_walker(), motion=motion)
     scene = shown.scene
-    found = read(shown.write_rrd(tmp_path / "walk.rrd"))
+    result = read(shown.write_rrd(tmp_path / "walk.rrd"))
     poses = [scene.at(row) for row in motion.values]
-    for place, body in enumerate(scene.mechanism.bodies):
-        moves = found[f"/model{body.path}"]
+    for index, body in enumerate(scene.mechanism.bodies):
+        moves = result[f"/model{body.path}"]
         for moment, pose in enumerate(poses):
             # Matrices stand column by column.
             turned = np.array(moves["Transform3D:mat3x3"][moment]).reshape(3, 3).T
-            assert np.allclose(turned, pose.rotations[place], atol=1e-6)
-            assert np.allclose(moves["Transform3D:translation"][moment], pose.origins[place], atol=1e-6)
+            assert np.allclose(turned, pose.rotations[index], atol=1e-6)
+            assert np.allclose(moves["Transform3D:translation"][moment], pose.origins[index], atol=1e-6)
     assert [time.total_seconds() for time in moves["time"]] == pytest.approx(motion.times)
     (push,) = [item for item in Pushes.of(scene, motion, motion.times).pushes if item.on.element == "RFootForce"]
-    arrows = found["/model/forces/forceset/RFootForce/RightShank"]
+    arrows = result["/model/forces/forceset/RFootForce/RightShank"]
     assert np.allclose(arrows["Arrows3D:origins"], [[push.point(k, pose)] for k, pose in enumerate(poses)], atol=1e-6)
-    size = found["/forces/forceset/RFootForce/RightShank"]["Scalars:scalars"]
+    size = result["/forces/forceset/RFootForce/RightShank"]["Scalars:scalars"]
     assert np.allclose(np.ravel(size), np.linalg.norm(push.forces, axis=1))
-    assert np.allclose(np.ravel(found["/coordinates/Pelvis_tx"]["Scalars:scalars"]), motion.values[:, 2])
+    assert np.allclose(np.ravel(result["/coordinates/Pelvis_tx"]["Scalars:scalars"]), motion.values[:, 2])
     items = [item for item in scene.drawn() if item.body >= 0]
-    meshes = {name for name, parts in found.items() if "Mesh3D:vertex_positions" in parts}
+    meshes = {name for name, parts in result.items() if "Mesh3D:vertex_positions" in parts}
     assert {f"/model{scene.mechanism.bodies[item.body].path}{item.path}" for item in items} <= meshes
 
 

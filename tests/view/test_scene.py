@@ -29,10 +29,10 @@ def with_shape(shape, folders=None):
     del pelvis.attached_geometry[:]
     pelvis.attach(shape)
     scene, mechanism = scene_of(model, folders)
-    found = [item for item in scene.items if item.path.startswith("/bodyset/Pelvis/")]
-    if not found:
+    result = [item for item in scene.items if item.path.startswith("/bodyset/Pelvis/")]
+    if not result:
         return scene, None
-    (item,) = found
+    (item,) = result
     assert mechanism.bodies[item.body].name == "Pelvis"
     return scene, scene.surfaces[item.surface].points @ item.matrix[:3, :3].T + item.matrix[:3, 3]
 
@@ -50,7 +50,7 @@ def with_shape(shape, folders=None):
 )
 def test_unit_shapes_are_closed_and_turned_outwards(make, volume):
     shape = make()
-    a, b, c = (shape.points[shape.triangles[:, place]] for place in range(3))
+    a, b, c = (shape.points[shape.triangles[:, index]] for index in range(3))
     areas = np.cross(b - a, c - a)
     enclosed = np.einsum("ij,ij->", a, areas) / 6.0
     assert volume * (0.7 if len(shape.points) < 100 else 0.95) < enclosed <= volume * (1.0 + 1e-12)

@@ -64,8 +64,8 @@ def asked(server: PageServer, body: bytes, length: str | None = None) -> tuple[i
 
 
 def test_a_pose_is_found(server):
-    status, found = asked(server, json.dumps({"values": [0.1] * 8}).encode())
-    assert status == 200 and len(found["values"]) == 8
+    status, result = asked(server, json.dumps({"values": [0.1] * 8}).encode())
+    assert status == 200 and len(result["values"]) == 8
 
 
 @pytest.mark.parametrize(
@@ -78,16 +78,16 @@ def test_a_pose_is_found(server):
     ],
 )  # fmt: skip
 def test_what_is_no_question_is_a_bad_request(server, body):
-    status, found = asked(server, body)
-    assert status == 400 and found["error"]
+    status, result = asked(server, body)
+    assert status == 400 and result["error"]
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e308", "-1e300", "1e999"])
 def test_numbers_that_no_pose_has(server, number):
     """An answer is always JSON, which knows neither NaN nor infinity."""
-    status, found = asked(server, f'{{"values": [{", ".join([number] * 8)}]}}'.encode())
+    status, result = asked(server, f'{{"values": [{", ".join([number] * 8)}]}}'.encode())
     assert status == 200
-    assert "error" in found or all(value == value for value in found["values"])
+    assert "error" in result or all(value == value for value in result["values"])
 
 
 @pytest.mark.parametrize("length", ["abc", "-1", "+2", "1.5", "0x2", "", "٣", "9" * 30, "1_0", "2, 2"])

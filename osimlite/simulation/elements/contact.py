@@ -94,7 +94,7 @@ class PairContact:
 
     def items(self, places: Places) -> list[Item]:
         """An item for each pair, and what computes them one by one if they depend on one another."""
-        found = []
+        result = []
         for pair in self.pairs:
             one, two = self.surfaces[pair.first], self.surfaces[pair.second]
             links, numbers = self.pair_numbers(pair, places)
@@ -103,10 +103,10 @@ class PairContact:
                 kernel = "touch_ellipsoid" if one.is_half_space else "touch_ellipsoids"
                 shapes = (surface for surface in (one, two) if not surface.is_half_space)
                 numbers = (*numbers, *(x for surface in shapes for x in _shape(surface, places)))
-            found.append(Item(kernel, links, numbers, is_contact=True, is_part=self.early_return))
+            result.append(Item(kernel, links, numbers, is_contact=True, is_part=self.early_return))
         if self.early_return:
-            found.append(self._early_return(places))
-        return found
+            result.append(self._early_return(places))
+        return result
 
     def pair_numbers(self, pair: ContactPair, places: Places) -> tuple[tuple[int, int], tuple[float, ...]]:
         """Links and numbers of a pair."""
@@ -178,7 +178,7 @@ class HuntCrossley(PairContact):
     @classmethod
     def make(cls, builder: ElementBuilder, force: HuntCrossleyForce) -> HuntCrossley:
         """The element of a force."""
-        surfaces = [surface_of(builder, force, *found) for found in geometries(builder, force)]
+        surfaces = [surface_of(builder, force, *result) for result in geometries(builder, force)]
         builder.check(force, (force.transition_velocity, *(x for surface in surfaces for x in surface.material)))
         pairs = []
         for first, second in combinations(range(len(surfaces)), 2):

@@ -178,7 +178,7 @@ def named(builder: ElementBuilder, controller: Controller) -> list[Any]:
 
 def actuators_by_name(builder: ElementBuilder) -> dict[str, Actuator]:
     """The first actuator of each name."""
-    found: dict[str, Actuator] = {}
+    result: dict[str, Actuator] = {}
     for component in builder.components(Actuator):
-        found.setdefault(component.name, component)
-    return found
+        result.setdefault(component.name, component)
+    return result

@@ -58,8 +58,8 @@ def pushing(table: str | Path, applied_to: Mapping[str, Sequence[Sequence[str]]]
     for body, several in applied_to.items():
         for number, names in enumerate(several, start=1):
             if not 1 <= len(names) <= len(PARTS) or not names[0]:
-                told = f"the load on '{body}' is {list(names)}; name what the labels of its force begin with"
-                raise SettingError(f"{told}, then of its point, then of its moment")
+                message = f"the load on '{body}' is {list(names)}; name what the labels of its force begin with"
+                raise SettingError(f"{message}, then of its point, then of its moment")
             identifiers: Any = {f"{part}_identifier": text for part, text in zip(PARTS, names, strict=False)}
             name = body.rpartition("/")[2] + (f"_{number}" if len(several) > 1 else "")
             loads.objects.append(ExternalForce(name=name, applied_to_body=body, **identifiers))
@@ -82,8 +82,8 @@ def read_external_loads(mechanism: Mechanism, source: str | Path | ExternalLoads
     if isinstance(source, ExternalLoads):
         loads, folder, file = source, Path(), None
     elif Path(source).suffix.lower() in TABLES:
-        told = "this is a table, which does not say what its forces push: name it in a document of ExternalLoads"
-        raise DocumentError(f"{told}, or say so to inverse-dynamics by --applied-to", file=str(source))
+        message = "this is a table, which does not say what its forces push: name it in a document of ExternalLoads"
+        raise DocumentError(f"{message}, or say so to inverse-dynamics by --applied-to", file=str(source))
     else:
         loads, folder, file = read_object(source, ExternalLoads), Path(source).parent, str(source)
     forces = [force for force in loads.objects if force.appliesForce]
@@ -176,7 +176,7 @@ class _Columns:
     def _functions(self) -> dict[int, Function]:
         """Those of all columns that are named, by their places: one solution of the equations of their splines."""
         starts = tuple({identifier for force in self._forces for identifier in _identifiers(force).values()})
-        named = [place for place, label in enumerate(self.table.columns) if label.startswith(starts)]
+        named = [index for index, label in enumerate(self.table.columns) if label.startswith(starts)]
         rows = self.table.rows[:, named]
         # Gaps are told of where they are asked for.
         sound = np.where(np.isfinite(rows), rows, 0.0)
@@ -202,8 +202,8 @@ class _Columns:
     def _why(self, identifier: str, places: Sequence[int]) -> str:
         file, labels = self.table.file, self.table.columns
         if places:
-            found = listed([labels[place] for place in places])
-            return f"exactly three columns must begin so, and '{file}' has {found}"
+            result = listed([labels[place] for place in places])
+            return f"exactly three columns must begin so, and '{file}' has {result}"
         starts = [label[:-1] for label in labels if label[-1:] in ("x", "X", "1")]
         near = nearest(identifier, starts) or nearest(identifier, labels)
         hint = f"; did you mean '{near}'?" if near else f"; its columns are {listed(labels)}"

@@ -146,12 +146,12 @@ class Formula:
         reader.steps += self.steps
         first = len(self.variables)
         derivatives = {variable: reader.add("number", value=1.0)}
-        for place, step in enumerate(self.steps, start=first):
+        for index, step in enumerate(self.steps, start=first):
             reader.known = dict(zip("xy", step.arguments, strict=False))
             for argument, rule in zip(step.arguments, DERIVATIVES.get(step.law, ()), strict=False):
                 if argument in derivatives:
                     part = reader.add("*", reader.read(rule), derivatives[argument])
-                    derivatives[place] = reader.add("+", derivatives[place], part) if place in derivatives else part
+                    derivatives[index] = reader.add("+", derivatives[index], part) if index in derivatives else part
         last = first + len(self.steps) - 1
         return Formula(
             self.variables,
@@ -183,7 +183,7 @@ class _Reader:
     """
 
     def __init__(self, variables: Sequence[str]) -> None:
-        self.known = {name: place for place, name in enumerate(variables)}
+        self.known = {name: index for index, name in enumerate(variables)}
         self.steps: list[Step] = []
         self._first = len(variables)
         self._operands: list[int] = []

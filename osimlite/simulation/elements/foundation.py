@@ -147,8 +147,8 @@ class Springs:
         # As in Simbody, a mesh that is wholly within another does not touch it.
         if not (own or others) or not (
             any(
-                mesh.is_one_piece and 0 < len(found) < len(mesh.triangles)
-                for mesh, found in ((first, own), (second, others))
+                mesh.is_one_piece and 0 < len(result) < len(mesh.triangles)
+                for mesh, result in ((first, own), (second, others))
             )
             or first.crosses(second.moved(one.inverse_times(two)))
         ):

@@ -223,13 +223,13 @@ class ElementBuilder:
         """
         if not value:
             raise ModelError(f"the '{field}' of '{self.path(holder)}' is empty; give it a name")
-        found = self.tree.target(holder, field, value)
-        if found is None:
+        result = self.tree.target(holder, field, value)
+        if result is None:
             raise ModelError(
                 f"the '{field}' of '{self.path(holder)}' names '{value}', which the model does not have; "
                 "run 'osimlite validate'"
             )
-        return found
+        return result
 
     def placement(self, frame: Any) -> FramePlacement:
         """Body and place in it of a frame."""

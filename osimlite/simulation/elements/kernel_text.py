@@ -94,10 +94,10 @@ class KernelText:
         """By column of the derivatives the place of the argument that is changed."""
         kind = self.kind
         inputs = list(kind.geometry.inputs if kind.inputs is None else kind.inputs)
-        found = {column: inputs.index(name) for column, name in enumerate(kind.geometry.inputs) if name in inputs}
+        result = {column: inputs.index(name) for column, name in enumerate(kind.geometry.inputs) if name in inputs}
         given = [column for column, state in enumerate(kind.states) if state.given]
         first = len(inputs) + kind.controlled
-        return found | {2 + column: first + number for number, column in enumerate(given)}
+        return result | {2 + column: first + number for number, column in enumerate(given)}
 
     @property
     def responds(self) -> bool:

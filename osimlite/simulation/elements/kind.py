@@ -164,7 +164,7 @@ class Kind:
         names = [name for name in self.outputs if name not in others] + list(self.kept)
         if self.geometry.speed and issubclass(self.component, Actuator):
             names.append(self.geometry.speed)
-        return {name: place for place, name in enumerate(dict.fromkeys(names))}
+        return {name: index for index, name in enumerate(dict.fromkeys(names))}
 
     @cached_property
     def known_of(self) -> dict[str, int]:

@@ -201,16 +201,16 @@ def probe_elements(builder: ElementBuilder, elements: Sequence[ForceElement]) ->
         ModelError: a probe names what does not exist, where OpenSim stops too.
     """
     by_path = {element.path: element for element in elements}
-    found = []
+    result = []
     for probe in builder.tree.components:
         kind = kind_of_probe(type(probe))
         if kind is None or not getattr(probe, "enabled", True):
             continue
         try:
-            found.append(_made(kind, builder, probe, by_path))
+            result.append(_made(kind, builder, probe, by_path))
         except UnsupportedError as error:
             tell(f"{error.message} is left out of the probes")
-    return found
+    return result
 
 
 def _made(kind: ProbeKind, builder: ElementBuilder, probe: Any, elements: Mapping[str, ForceElement]) -> DeclaredProbe:

@@ -108,13 +108,13 @@ class TriangleMesh:
                 "turn the same way; close it in a mesh program",
                 file=file,
             )
-        found = cls(points, triangles)
-        if not np.all(found.areas > 0.0):
-            flat = np.count_nonzero(~(found.areas > 0.0))
+        result = cls(points, triangles)
+        if not np.all(result.areas > 0.0):
+            flat = np.count_nonzero(~(result.areas > 0.0))
             raise ModelError(f"the mesh has {flat} triangles without area; remove them in a mesh program", file=file)
-        corners = found.corners
+        corners = result.corners
         volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
-        return found if volume > 0.0 else cls(points, triangles[:, ::-1])
+        return result if volume > 0.0 else cls(points, triangles[:, ::-1])
 
     def moved(self, frame: Array) -> TriangleMesh:
         """The surface in another frame, in which its own is `frame` (4, 4)."""
@@ -177,8 +177,8 @@ class TriangleMesh:
         apart = np.linalg.norm(places[:, None] - self.centroids, axis=2)
         least = (apart + self._reaches).min(axis=1)
         which, triangles = np.nonzero(apart - self._reaches <= least[:, None])
-        found = _nearest_on_triangles(self.corners[triangles], places[which])
-        ways = found - places[which]
+        result = _nearest_on_triangles(self.corners[triangles], places[which])
+        ways = result - places[which]
         squares = np.einsum("ij,ij->i", ways, ways)
         bound = np.full(len(places), np.inf)
         np.minimum.at(bound, which, squares)
@@ -187,7 +187,7 @@ class TriangleMesh:
         near = np.flatnonzero(squares <= _AS_NEAR * bound[which])
         order = near[np.lexsort((-np.abs(height[near]), which[near]))]
         best = order[np.unique(which[order], return_index=True)[1]]
-        return found[best], height[best] > 0.0
+        return result[best], height[best] > 0.0
 
     def crosses(self, other: TriangleMesh) -> bool:
         """Whether a triangle of one surface cuts one of the other."""

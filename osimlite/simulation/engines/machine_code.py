@@ -53,8 +53,8 @@ def make_ready(names: Sequence[str]) -> None:
         for name in own:
             keep(made(name))
         for helper in helpers:
-            for found in helper.found():
-                keep(found)
+            for result in helper.found():
+                keep(result)
     for name in missing:
         if name not in _addresses:
             keep(made(name))
@@ -66,10 +66,10 @@ def is_at_hand(name: str) -> bool:
         return True
     from osimlite.simulation.engines.object_code import load
 
-    found = load(name, digest_of(law_function(name)))
-    if found is not None:
-        _addresses[name] = found
-    return found is not None
+    result = load(name, digest_of(law_function(name)))
+    if result is not None:
+        _addresses[name] = result
+    return result is not None
 
 
 def _keep(law: Made) -> None:

@@ -145,9 +145,9 @@ def numba_version() -> str:
     """Of numba, which is not loaded to find out; importlib.metadata alone takes as long to load as all machine code."""
     spec = find_spec("numba")
     told = Path(spec.origin).with_name("_version.py").read_text("utf-8") if spec is not None and spec.origin else ""
-    found = re.search(r'"version": "(.+)"', told)
-    if found is not None:
-        return found[1]
+    result = re.search(r'"version": "(.+)"', told)
+    if result is not None:
+        return result[1]
     from importlib.metadata import version
 
     return version("numba")

@@ -68,8 +68,8 @@ def made(name: str) -> Made:
 
         text, symbol = compiled(function)
     except (AttributeError, ImportError, NotImplementedError, TypeError) as error:
-        told = f"numba {numba_version()} cannot compile osimlite's kernels ({error}); pip install 'numba{TESTED}'"
-        raise OsimliteError(told) from error
+        message = f"numba {numba_version()} cannot compile osimlite's kernels ({error}); pip install 'numba{TESTED}'"
+        raise OsimliteError(message) from error
     return Made(name, digest_of(function), translated(text), symbol)
 
 

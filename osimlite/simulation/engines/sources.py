@@ -28,12 +28,12 @@ def functions_within(function: Any) -> Iterator[FunctionType]:
     """
     pending, seen = [function], set()
     while pending:
-        found = pending.pop()
-        if found in seen:
+        result = pending.pop()
+        if result in seen:
             continue
-        seen.add(found)
-        yield found
-        pending += [value for _, value in _named(found) if _is_ours(value)]
+        seen.add(result)
+        yield result
+        pending += [value for _, value in _named(result) if _is_ours(value)]
 
 
 def _told(function: FunctionType) -> tuple[Any, ...]:

@@ -30,12 +30,12 @@ def read_c3d_markers(path: str | Path) -> tuple[tuple[str, ...], Array, Array]:
         DocumentError: it is no .c3d file.
         MissingDependency: ezc3d is not installed.
     """
-    found = _opened(path)
-    points = found["parameters"]["POINT"]
+    result = _opened(path)
+    points = result["parameters"]["POINT"]
     unit = METRES.get(points["UNITS"]["value"][0].strip().lower(), 0.001)
     names = tuple(name for key, more in points.items() if key.startswith("LABELS") for name in more["value"])
-    positions = np.moveaxis(found["data"]["points"][:3], (2, 1, 0), (0, 1, 2))
-    times = _start(found) + np.arange(len(positions)) / found["header"]["points"]["frame_rate"]
+    positions = np.moveaxis(result["data"]["points"][:3], (2, 1, 0), (0, 1, 2))
+    times = _start(result) + np.arange(len(positions)) / result["header"]["points"]["frame_rate"]
     return names[: positions.shape[1]], times, unit * positions
 
 
@@ -50,8 +50,8 @@ def read_c3d_forces(path: str | Path) -> StoTable:
         DocumentError: it is no .c3d file, or it has no force plates.
         MissingDependency: ezc3d is not installed.
     """
-    found = _opened(path, extract_forceplat_data=True)
-    plates = found["data"]["platform"]
+    result = _opened(path, extract_forceplat_data=True)
+    plates = result["data"]["platform"]
     if not plates:
         raise DocumentError("the file has no force plates", file=str(path))
     columns, rows = list[str](), list[Array]()
@@ -62,7 +62,7 @@ def read_c3d_forces(path: str | Path) -> StoTable:
         for letter, values in (("f", plate["force"]), ("p", middle), ("m", moment)):
             columns += [f"{letter}{number}_{axis}" for axis in "xyz"]
             rows += list(values)
-    times = _start(found) + np.arange(len(rows[0])) / found["header"]["analogs"]["frame_rate"]
+    times = _start(result) + np.arange(len(rows[0])) / result["header"]["analogs"]["frame_rate"]
     return StoTable("forces", times, tuple(columns), np.stack(rows, axis=1), file=str(path))
 
 

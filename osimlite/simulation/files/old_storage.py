@@ -87,7 +87,7 @@ def _eights(part: Array, count: int) -> list[NDArray[np.int64]]:
     The last is rounded to the nearest, to the even of two, and may be 1e8. A product comes with what its rounding
     leaves over: T. J. Dekker, Numer. Math. 18, 1971. 1e8 has few enough digits for all to be exact.
     """
-    high, low, found = part, np.zeros_like(part), []
+    high, low, result = part, np.zeros_like(part), []
     for number in range(count):
         product, split = 1e8 * high, 134217729.0 * high
         upper = split - (split - high)
@@ -105,8 +105,8 @@ def _eights(part: Array, count: int) -> list[NDArray[np.int64]]:
             rest = value - whole
             high = rest + over
             low = over - (high - rest)
-        found.append(whole.astype(np.int64))
-    return found
+        result.append(whole.astype(np.int64))
+    return result
 
 
 @cache

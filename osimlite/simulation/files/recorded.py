@@ -60,7 +60,7 @@ def excluded_forces(model: Model, names: Iterable[str]) -> list[Force]:
     """
     forces = {force.name: force for force in model.components(Force)}
     groups = {group.name: group.members for group in model.force_set.groups}
-    found: list[Force] = []
+    result: list[Force] = []
     for name in names:
         kind = KINDS.get(name.lower())
         members = [force for force in forces.values() if is_a(force, kind)] if kind else []
@@ -70,8 +70,8 @@ def excluded_forces(model: Model, names: Iterable[str]) -> list[Force]:
                 raise SettingError(f"'{model.name}' has no force and no group of forces '{name}'{near}")
             named = [str(getattr(member, "name", member)) for member in groups.get(name, (name,))]
             members = [forces[member] for member in named if member in forces]
-        found += members
-    return found
+        result += members
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,9 +123,9 @@ class RecordedMotion(Movement):
                     raise SettingError(f"'{name}' has {had} values for {counted(len(moments), 'time')}; give one each")
             rows = np.column_stack([np.empty((len(moments), 0)), *columns])
             return cls._of_table(mechanism, StoTable("arrays", moments, tuple(source), rows))
-        found = source.mechanism.coordinates
+        result = source.mechanism.coordinates
         return cls._of_table(
-            mechanism, StoTable("motion", source.times, tuple(info.path for info in found), source.values)
+            mechanism, StoTable("motion", source.times, tuple(info.path for info in result), source.values)
         )
 
     @classmethod
@@ -152,16 +152,16 @@ class RecordedMotion(Movement):
         states = columns_of_states(
             table.columns, [f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")]
         )
-        found: dict[int, int] = {}
+        result: dict[int, int] = {}
         for place, info in enumerate(mechanism.coordinates):
             columns = (places.get(info.name), places.get(info.path), states.get(f"{info.path}/value"))
-            column = next((one for one in columns if one is not None and one not in found.values()), None)
+            column = next((one for one in columns if one is not None and one not in result.values()), None)
             if column is not None:
-                found[place] = column
+                result[place] = column
                 turned = table.in_degrees and info.motion_type == "rotational"
                 values[:, place] = np.radians(table.rows[:, column]) if turned else table.rows[:, column]
         # Speeds in a file of states follow from the values, and states of forces are no part of a pose.
-        used = {*found.values(), *states.values()}
+        used = {*result.values(), *states.values()}
         ignored = [
             label
             for place, label in enumerate(table.columns)
@@ -169,7 +169,7 @@ class RecordedMotion(Movement):
         ]
         if not mechanism.coordinates:
             raise ModelError(f"'{mechanism.name}' has no coordinates: it cannot follow a motion", file=table.file)
-        if not found:
+        if not result:
             raise DocumentError(
                 f"no column is a coordinate of '{mechanism.name}'; its coordinates are "
                 f"{listed(mechanism.coordinate_names)}",
@@ -188,7 +188,7 @@ class RecordedMotion(Movement):
             told = f"'{name}' is {values[row, place]} at {table.times[row]:g} s; "
             told += "fill the gaps" if not np.isfinite(values[row, place]) else "no body goes so far"
             raise DocumentError(told, file=table.file)
-        missing = tuple(info.name for place, info in enumerate(mechanism.coordinates) if place not in found)
+        missing = tuple(info.name for place, info in enumerate(mechanism.coordinates) if place not in result)
         return cls(mechanism, table.times, values, missing, tuple(ignored))
 
     @cached_property

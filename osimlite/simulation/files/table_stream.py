@@ -98,24 +98,24 @@ class TableStream:
 
     def _read_header(self) -> None:
         beginning = b"".join(self._stream.readlines(LONGEST_HEADER))
-        found = StorageHeader(beginning, self.file)
-        if not found.end.text:
+        result = StorageHeader(beginning, self.file)
+        if not result.end.text:
             raise DocumentError(_no_storage(beginning[:100].lstrip()), file=self.file)
-        self._stream.seek(found.rows)
-        self.line, self.name, self.in_degrees = found.label_line, found.name, found.in_degrees
-        self.header = {entry.key.text: entry.value.text for entry in found.entries.values()}
-        ends = suffixes(found.kind, self.file)
-        self.kind = "double" if ends == ("",) else found.kind
-        if not found.labels:
-            raise DocumentError("the table ends before its column labels", file=self.file, line=found.end.at.line)
-        labels = [label.text for label in found.labels]
-        at = next((place for place, label in enumerate(labels) if label.lower() == "time"), None)
+        self._stream.seek(result.rows)
+        self.line, self.name, self.in_degrees = result.label_line, result.name, result.in_degrees
+        self.header = {entry.key.text: entry.value.text for entry in result.entries.values()}
+        ends = suffixes(result.kind, self.file)
+        self.kind = "double" if ends == ("",) else result.kind
+        if not result.labels:
+            raise DocumentError("the table ends before its column labels", file=self.file, line=result.end.at.line)
+        labels = [label.text for label in result.labels]
+        at = next((index for index, label in enumerate(labels) if label.lower() == "time"), None)
         if at is None or (at > 0 and self.kind != "double"):
             raise DocumentError(
                 f"the first column is '{labels[0]}'; it must be 'time'",
                 file=self.file,
                 line=self.line,
-                column=found.labels[0].at.column,
+                column=result.labels[0].at.column,
             )
         self._time = at
         self.labels = (*labels[:at], *labels[at + 1 :])

@@ -40,8 +40,8 @@ def place_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: 
 def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Velocity and own acceleration in SCRATCH; what turns the joint forwards stays in the operation."""
     own = at(s, s[s[OPERATION_AT] + OPERATION_INTS * operation + ARGUMENTS])
-    kept, found, u = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH), at(y, s[FREEDOMS])
-    arm, total = minus(vector(kept, POINT), vector(found, 0)), ZERO
+    kept, result, u = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH), at(y, s[FREEDOMS])
+    arm, total = minus(vector(kept, POINT), vector(result, 0)), ZERO
     for row in range(1, 3):
         last = own[TURNS + row]
         if last < 0:
@@ -64,8 +64,8 @@ def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
         total = along(total, -rate(s, w, u, last), cross(axis, drift))
     kept[AMOUNT], kept[RATE], kept[CURVATURE] = total
     total = times(float(own[SIGN]), total)
-    set_row(found, ZERO, ZERO)
-    set_row(at(found, 6), cross(arm, total), total)
+    set_row(result, ZERO, ZERO)
+    set_row(at(result, 6), cross(arm, total), total)
     return OK
 
 

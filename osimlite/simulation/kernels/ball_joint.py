@@ -65,11 +65,11 @@ def place_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
 def move_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Columns of the three speeds, rates of the angles; velocity and own acceleration in SCRATCH."""
     j = at(s, s[OPERATION_AT] + OPERATION_INTS * operation)
-    kept, found, radii = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH), at(x, j[EXTRA])
+    kept, result, radii = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH), at(x, j[EXTRA])
     angles, u = at(s, j[ARGUMENTS]), at(y, s[FREEDOMS])
     sign = 1.0 if j[MOTION] == BALL else -1.0
     n, far = last_axis(y, angles), vector(radii, 0)
-    arm, spin = minus(vector(kept, POINT), vector(found, 0)), (u[angles[0]], u[angles[1]], u[angles[2]])
+    arm, spin = minus(vector(kept, POINT), vector(result, 0)), (u[angles[0]], u[angles[1]], u[angles[2]])
     turn = shift = ZERO
     for k in range(3):
         axis = replaced(ZERO, k, 1.0)
@@ -77,8 +77,8 @@ def move_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: in
         m = plus(times(sign, turned(kept, left_behind(far, axis, n))), cross(arm, e))
         add_row(at(w, s[WORK_COLUMN] + 6 * angles[k]), 1.0, e, m)
         turn, shift = along(turn, spin[k], e), along(shift, spin[k], m)
-    set_row(found, turn, shift)
-    set_row(at(found, 6), times(sign, turned(kept, left_behind(far, spin, cross(spin, n)))), ZERO)
+    set_row(result, turn, shift)
+    set_row(at(result, 6), times(sign, turned(kept, left_behind(far, spin, cross(spin, n)))), ZERO)
     if abs(sine_cosine(y[angles[1]])[1]) < 1e-12:
         return SINGULAR_RATES
     for k in range(3):

@@ -103,16 +103,16 @@ def solver_room(obstacles: int) -> int:
 def cable_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Length and speed of a cable; NaN if it is none, since a point is inside an obstacle."""
     i, p = at(s, item), at(x, s[item + NUMBERS])
-    found = at(w, i[RECORD])
+    result = at(w, i[RECORD])
     elements = at(i, ELEMENTS)
     for k in range(i[COUNT]):
-        place_element(s, w, at(elements, ELEMENT_INTS * k), p, found)
+        place_element(s, w, at(elements, ELEMENT_INTS * k), p, result)
     length, first = 0.0, 0
     for k in range(1, i[COUNT]):
         if elements[ELEMENT_INTS * k + IS_OBSTACLE] == 0:
-            length += span(elements, p, found, first, k, at(found, i[SOLVER]))
+            length += span(elements, p, result, first, k, at(result, i[SOLVER]))
             first = k
-    found[LENGTH], found[SPEED] = length, speed(s, w, i[COUNT], elements, found)
+    result[LENGTH], result[SPEED] = length, speed(s, w, i[COUNT], elements, result)
     return OK
 
 
@@ -402,13 +402,13 @@ def speed(s: Ints, w: Floats, count: int, elements: Ints, found: Floats) -> floa
 def pull_cable(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Pull at the points of a cable and at both ends of each geodesic; a cable does not push."""
     i, p = at(s, item), at(x, s[item + NUMBERS])
-    found, elements = at(w, i[RECORD]), at(i, ELEMENTS)
-    tension, last = found[TENSION], i[COUNT] - 1
+    result, elements = at(w, i[RECORD]), at(i, ELEMENTS)
+    tension, last = result[TENSION], i[COUNT] - 1
     if tension < 0.0:
         return OK
     for k in range(last + 1):
         element = at(elements, ELEMENT_INTS * k)
-        own, kept, link = at(p, element[AT]), at(found, element[KEPT]), element[LINK]
+        own, kept, link = at(p, element[AT]), at(result, element[KEPT]), element[LINK]
         if element[IS_OBSTACLE] == 0:
             place = station(s, w, link, vector(own, PULLED))
             if k > 0:

@@ -62,11 +62,11 @@ LEAST, MOST, SAFETY, STRETCH, LESS, MORE = 0.1, 5.0, 0.9, 0.1, 0.9, 1.2
 def value(p: Floats, a: Vector) -> float:
     """The function whose zeros are the surface."""
     x, y, z = a
-    found = p[SQUARE] - dot(elementwise(vector(p, WEIGHTS), a), a)
+    result = p[SQUARE] - dot(elementwise(vector(p, WEIGHTS), a), a)
     if p[KIND] == TORUS:
         across = p[RADIUS] - sqrt(x * x + y * y)
-        found = 1.0 - (across * across + z * z) / (p[TUBE] * p[TUBE])
-    return float(found)
+        result = 1.0 - (across * across + z * z) / (p[TUBE] * p[TUBE])
+    return float(result)
 
 
 def gradient(p: Floats, a: Vector) -> Vector:

@@ -41,11 +41,11 @@ def touch_spheres(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int
 def press(s: Ints, x: Floats, w: Floats, item: int, d: float, radius: float, n: Vector, point: Vector) -> None:
     """The force of a contact of a depth at a point, on both surfaces and in the record."""
     i = at(s, item)
-    one, two, p, found = i[OWN], i[OWN + 1], at(x, i[NUMBERS]), at(w, i[RECORD])
+    one, two, p, result = i[OWN], i[OWN + 1], at(x, i[NUMBERS]), at(w, i[RECORD])
     v = minus(velocity(s, w, one, point), velocity(s, w, two, point))
     force = contact_force(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
-    put(found, 0, force)
-    put(found, 3, point)
-    found[6], found[7] = d, radius
+    put(result, 0, force)
+    put(result, 3, point)
+    result[6], result[7] = d, radius
     apply_force(s, w, two, point, force)
     apply_force(s, w, one, point, times(-1.0, force))

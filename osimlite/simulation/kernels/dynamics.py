@@ -222,8 +222,8 @@ def apply_forces(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
     for number in range(s[FREEDOMS], s[STATE_SIZE]):
         f[number] = 0.0
     for number in range(s[CONTACTS]):
-        found = at(w, s[WORK_CONTACT] + CONTACT_WORK * number)
-        found[0], found[1], found[2], found[DEPTH_OF] = 0.0, 0.0, 0.0, 0.0
+        result = at(w, s[WORK_CONTACT] + CONTACT_WORK * number)
+        result[0], result[1], result[2], result[DEPTH_OF] = 0.0, 0.0, 0.0, 0.0
     for number in range(s[ITEMS]):
         item = s[s[ITEM_AT] + number]
         status = call(s[item + LAW], s, x, w, y, f, item)

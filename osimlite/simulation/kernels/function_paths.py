@@ -27,19 +27,19 @@ DERIVATIVES = 1
 
 def function_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Length and speed of a FunctionBasedPath, and its moment arms."""
-    i, found = at(s, item), at(w, s[item + RECORD])
+    i, result = at(s, item), at(w, s[item + RECORD])
     count, coordinates = i[COUNT], at(i, COORDINATES)
     length = called(s, x, w, y, f, item - i[LENGTH_BACK])
     speed = 0.0
     for k in range(count):
         back = coordinates[count + k]
         arm = called(s, x, w, y, f, item - back)[0] if back > 0 else -length[DERIVATIVES + k]
-        found[ARMS + k] = arm
+        result[ARMS + k] = arm
         if coordinates[k] >= 0:
             speed -= arm * f[coordinates[k]]
     if i[SPEED_BACK] > 0:
         speed = called(s, x, w, y, f, item - i[SPEED_BACK])[0]
-    found[LENGTH], found[SPEED] = length[0], speed
+    result[LENGTH], result[SPEED] = length[0], speed
     return OK
 
 
@@ -51,19 +51,19 @@ def called(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> Fl
 
 def pull_coordinates(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Apply the tension of a path by its moment arms."""
-    i, found = at(s, item), at(w, s[item + RECORD])
+    i, result = at(s, item), at(w, s[item + RECORD])
     for k in range(i[COUNT]):
         freedom = i[COORDINATES + k]
         if freedom >= 0:
-            f[s[FREEDOMS] + freedom] += found[ARMS + k] * found[TENSION]
+            f[s[FREEDOMS] + freedom] += result[ARMS + k] * result[TENSION]
     return OK
 
 
 def function_of_one(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Of a function of one argument, by its table."""
-    i, p, found = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    i, p, result = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
     place = i[ARGUMENTS]
-    found[0], found[DERIVATIVES], _ = value_at(at(p, 1), y[place] if place >= 0 else p[0])
+    result[0], result[DERIVATIVES], _ = value_at(at(p, 1), y[place] if place >= 0 else p[0])
     return OK
 
 
@@ -73,9 +73,9 @@ def polynomial(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
     The terms are sorted by the power of the first argument, then of the next. In the record stand, after the
     derivatives, the powers of each argument, which powers the term has, and its factors up to each argument.
     """
-    i, p, found = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    i, p, result = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
     size, width = i[SIZE], i[ORDER] + 1
-    powers = at(found, DERIVATIVES + size)
+    powers = at(result, DERIVATIVES + size)
     exponents, factors = at(powers, size * width), at(powers, size * width + size)
     for k in range(size):
         place = i[ARGUMENTS + k]
@@ -83,7 +83,7 @@ def polynomial(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
         powers[k * width] = 1.0
         for power in range(1, width):
             powers[k * width + power] = powers[k * width + power - 1] * argument
-        found[DERIVATIVES + k] = exponents[k] = 0.0
+        result[DERIVATIVES + k] = exponents[k] = 0.0
     value, term, total = 0.0, 0, 0
     while True:
         product = p[size + term]
@@ -95,7 +95,7 @@ def polynomial(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
         for k in range(size - 1, -1, -1):
             power = int(exponents[k])
             if power > 0:
-                found[DERIVATIVES + k] += factors[k] * (power * powers[k * width + power - 1]) * after
+                result[DERIVATIVES + k] += factors[k] * (power * powers[k * width + power - 1]) * after
             after *= powers[k * width + power]
         # The next term.
         k = size - 1
@@ -108,7 +108,7 @@ def polynomial(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
         exponents[k] += 1.0
         total += 1
         term += 1
-    found[0] = value
+    result[0] = value
     return OK
 
 
@@ -118,13 +118,13 @@ def formula(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> i
     After its arguments stand the programs of the value and of the derivatives, if these are asked for: the count of
     steps, the place of the constants, and the steps. The registers are in the record.
     """
-    i, p, found = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    i, p, result = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
     size = i[SIZE]
-    program, registers = at(i, ARGUMENTS + size), at(found, DERIVATIVES + size)
+    program, registers = at(i, ARGUMENTS + size), at(result, DERIVATIVES + size)
     for number in range(i[ORDER]):
         for k in range(size):
             place = i[ARGUMENTS + k]
             registers[k] = y[place] if place >= 0 else p[k]
-        found[number] = compute(at(program, 2), program[0], at(p, program[1]), registers, size)
+        result[number] = compute(at(program, 2), program[0], at(p, program[1]), registers, size)
         program = at(program, 2 + 3 * program[0])
     return OK

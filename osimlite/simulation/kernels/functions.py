@@ -186,8 +186,8 @@ def several_at(
     table = at(constants, size)
     factor, count = table[1], int(table[2])
     value = rate = curvature = 0.0
-    for place in range(size):
-        gradient[place] = 0.0
+    for index in range(size):
+        gradient[index] = 0.0
     for term in range(count):
         coefficient, powers = factor * table[3 + term], at(table, 3 + count + term * size)
         value += coefficient * product(size, arguments, constants, y, powers, -1, -1)
@@ -207,8 +207,8 @@ def several_at(
                 curvature += second * rates[arguments[one]] * rates[arguments[two]]
     if int(table[0]) == MONOMIALS_OF_OPENSIM:
         total = 0.0
-        for place in range(size):
-            total += rates[arguments[place]] if arguments[place] >= 0 else 0.0
+        for index in range(size):
+            total += rates[arguments[index]] if arguments[index] >= 0 else 0.0
         curvature = rate * total
     return value, rate, curvature
 
@@ -216,7 +216,7 @@ def several_at(
 def product(size: int, arguments: Ints, constants: Floats, y: Floats, powers: Floats, one: int, two: int) -> float:
     """Product of powers of all arguments; the powers of arguments `one` and `two` (-1 for none) are one less."""
     total = 1.0
-    for place in range(size):
-        power = int(powers[place]) - (1 if place == one else 0) - (1 if place == two else 0)
-        total *= (y[arguments[place]] if arguments[place] >= 0 else constants[place]) ** power
+    for index in range(size):
+        power = int(powers[index]) - (1 if index == one else 0) - (1 if index == two else 0)
+        total *= (y[arguments[index]] if arguments[index] >= 0 else constants[index]) ** power
     return total

@@ -33,13 +33,13 @@ from osimlite.simulation.kernels.wrap_curves import pieces
 
 def trace_geodesics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Write all corners of a path that was measured into f, in ground; returns how many there are."""
-    i, p, found = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    i, p, result = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
     points, wraps = i[POINTS], at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * i[WRAPS]))
-    order, work = at(found, ORDER), at(found, ORDER + points + 2 * i[WRAPS])
+    order, work = at(result, ORDER), at(result, ORDER + points + 2 * i[WRAPS])
     slots = at(wraps, WRAP_INTS * i[WRAPS])
-    geodesic, room = at(found, slots[CHAIN] + GEODESIC), at(found, slots[SEARCH])
+    geodesic, room = at(result, slots[CHAIN] + GEODESIC), at(result, slots[SEARCH])
     count = 0
-    for k in range(int(found[COUNT])):
+    for k in range(int(result[COUNT])):
         number = int(order[k])
         here = at(work, NODE_WORK * number)
         put(f, 3 * count, vector(here, PLACE))
@@ -48,7 +48,7 @@ def trace_geodesics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: i
         if number >= points and number == points + 2 * wrap:
             surface, pose = (
                 at(p, wraps[WRAP_INTS * wrap + PLACES] + SURFACE),
-                at(found, slots[POSES] + POSE_NUMBERS * wrap),
+                at(result, slots[POSES] + POSE_NUMBERS * wrap),
             )
             point = in_surface(pose, vector(here, PLACE))
             way = turned_back(pose, vector(work, NODE_WORK * int(order[k - 1]) + ALONG))
@@ -59,18 +59,18 @@ def trace_geodesics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: i
 
 def trace_cable(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """The same of a cable."""
-    i, p, found = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    i, p, result = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
     count = 0
     for k in range(i[CABLE_COUNT]):
         element = at(i, ELEMENTS + ELEMENT_INTS * k)
-        kept = at(found, element[KEPT])
+        kept = at(result, element[KEPT])
         if element[IS_OBSTACLE] == 0:
             put(f, 3 * count, vector(kept, 0))
             count += 1
         elif kept[STATE] == TOUCHES:
             geodesic = at(kept, GEODESIC)
             point, way = vector(geodesic, START + POINT), vector(geodesic, START + ALONG_GEODESIC)
-            surface, pose, room = at(p, element[AT] + CABLE_SURFACE), at(kept, IN_GROUND), at(found, i[SOLVER])
+            surface, pose, room = at(p, element[AT] + CABLE_SURFACE), at(kept, IN_GROUND), at(result, i[SOLVER])
             put(f, 3 * count, vector(kept, GROUND_START + POINT))
             count += 1
             count += trace_geodesic(surface, pose, point, way, geodesic[ARC], geodesic, room, at(f, 3 * count))

@@ -114,20 +114,20 @@ def geodesic_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int
     """Length and speed of a path with wraps."""
     place_points(s, x, w, y, item)
     i, p = at(s, item), at(x, s[item + NUMBERS])
-    found, points, size = at(w, i[RECORD]), i[POINTS], i[POINTS] + 2 * i[WRAPS]
-    order, work = at(found, ORDER), at(found, ORDER + size)
+    result, points, size = at(w, i[RECORD]), i[POINTS], i[POINTS] + 2 * i[WRAPS]
+    order, work = at(result, ORDER), at(result, ORDER + size)
     slots = at(i, NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS])
     place_surfaces(s, w, i, p)
-    for k in range(1, int(found[COUNT])):
-        find_near(i, p, found, slots, int(order[k - 1]), int(order[k]))
-    for k in range(int(found[COUNT]) - 2, -1, -1):
-        count = bend(i, p, found, int(order[k]), int(order[k + 1]))
+    for k in range(1, int(result[COUNT])):
+        find_near(i, p, result, slots, int(order[k - 1]), int(order[k]))
+    for k in range(int(result[COUNT]) - 2, -1, -1):
+        count = bend(i, p, result, int(order[k]), int(order[k + 1]))
         if count > 0:
-            for other in range(int(found[COUNT]) - 1, k, -1):
+            for other in range(int(result[COUNT]) - 1, k, -1):
                 order[other + 2 * count] = order[other]
-            found[COUNT] += 2.0 * count
+            result[COUNT] += 2.0 * count
         for number in range(count):
-            slot = at(found, slots[BEST] + SLOT * (number + 1))
+            slot = at(result, slots[BEST] + SLOT * (number + 1))
             node = points + 2 * int(slot[OWNER])
             one, two = at(work, NODE_WORK * node), at(work, NODE_WORK * (node + 1))
             put(one, PLACE, vector(slot, GROUND_START + POINT))
@@ -292,7 +292,7 @@ def meet_most(
 
     Those with a side come first, since sides are told of the points of the path.
     """
-    found, place, most, axis = 0, 0, 0.0, (0.0, 0.0, 0.0)
+    result, place, most, axis = 0, 0, 0.0, (0.0, 0.0, 0.0)
     for number in range(i[WRAPS]):
         own, pose = at(wraps, WRAP_INTS * number), at(poses, POSE_NUMBERS * number)
         if own[FIRST] == one and pose[HOW] != NOT and place_of(chain, count, number) == 0:
@@ -309,8 +309,8 @@ def meet_most(
                         if other > TOUCH:
                             turn, point, way = other, there, onwards
                     if turn > TOUCH and turn + before > most:
-                        found, place, most, axis = number, k + 1, turn + before, cross(point, way)
-    return found, place, axis
+                        result, place, most, axis = number, k + 1, turn + before, cross(point, way)
+    return result, place, axis
 
 
 def insert(p: Floats, pose: Floats, chain: Floats, count: int, place: int, number: int) -> None:

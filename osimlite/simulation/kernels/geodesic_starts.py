@@ -232,12 +232,12 @@ def around_ellipsoid(
         mirrored = replaced(out, axis, -component(out, axis))
         out = times(1.0 if dot(mirrored, out) >= 0.0 else -1.0, out)
     out = elementwise(scale, out)
-    found = on_section(radii, one, two, cross(out, way), room)
-    turn, _, sets_out, _ = found
+    result = on_section(radii, one, two, cross(out, way), room)
+    turn, _, sets_out, _ = result
     is_bent = dot(unit(sets_out), unit(vector(room, 0))) < BENT and (side == 0.0 or dot(out, middle) > 0.0)
     if p[KIND] == ELLIPSOID and (is_bent or how == PULLED):
-        found = shortened(p, turn, first, second, room)
-    return found
+        result = shortened(p, turn, first, second, room)
+    return result
 
 
 def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector:
@@ -262,11 +262,11 @@ def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector
     for k in range(WAYS):
         after = below(aa, ab, bb, ma, mb, k)
         if here < before and here <= after:
-            found = here, 2.0 * pi / WAYS * (k - 1 + 0.5 * (before - after) / (before - 2.0 * here + after))
+            result = here, 2.0 * pi / WAYS * (k - 1 + 0.5 * (before - after) / (before - 2.0 * here + after))
             if here < best[0]:
-                best, second = found, best
+                best, second = result, best
             elif here < second[0]:
-                second = found
+                second = result
         before, here = here, after
     depth, angle = second if deeper > 0.0 else best
     if depth == inf or depth > max(deeper, 1.0) * best[0]:

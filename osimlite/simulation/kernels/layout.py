@@ -135,7 +135,7 @@ FORCE, DEPTH_OF, RADIUS_OF = 0, 6, 7
 contact."""
 
 # Kinds.
-TURN, SLIDE, BALL, BALL_BACK, DRIFT = 0, 1, 2, 3, 4
+TURN, SLIDE, BALL, BALL_BACK, ACCELERATION_ERROR = 0, 1, 2, 3, 4
 """Motions: about z, along an axis (those before BALL have one axis), a SphericalMotion, one that is passed from end to
 start, a SimbodyAccelerationError."""
 NOTHING, SHIFT, MOVE = 0, 1, 2

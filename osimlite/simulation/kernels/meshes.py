@@ -24,9 +24,9 @@ def touch_mesh(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
     """
     i = at(s, item)
     one, two, count, is_plane = i[OWN], i[OWN + 1], i[OWN + 3], i[OWN + 4]
-    p, found = at(x, i[NUMBERS]), at(w, i[RECORD])
+    p, result = at(x, i[NUMBERS]), at(w, i[RECORD])
     for k in range(MESH_WORK):
-        found[k] = 0.0
+        result[k] = 0.0
     o, about = station(s, w, one, vector(p, 0)), station(s, w, two, vector(p, 7))
     n, way = direction(s, w, one, vector(p, 3)), minus(about, o)
     if is_plane:
@@ -54,14 +54,14 @@ def touch_mesh(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
 def load_mesh(s: Ints, w: Floats, item: int, about: Vector, force: Vector, torque: Vector, energy: float) -> None:
     """Apply a force at a point, and a torque, to the mesh, and their opposites to surface 1; fill both records."""
     i = at(s, item)
-    one, two, found = i[OWN], i[OWN + 1], at(w, i[RECORD])
+    one, two, result = i[OWN], i[OWN + 1], at(w, i[RECORD])
     contact = at(w, s[s[s[CONTACT_AT] + i[FIRST_CONTACT] + i[OWN + 2]] + RECORD])
-    put(found, 0, force)
-    put(found, 3, about)
-    put(found, 6, torque)
+    put(result, 0, force)
+    put(result, 3, about)
+    put(result, 6, torque)
     put(contact, 0, force)
     put(contact, 3, about)
-    found[9] = energy
+    result[9] = energy
     apply_force(s, w, two, about, force)
     apply_torque(s, w, two, torque)
     apply_force(s, w, one, about, times(-1.0, force))

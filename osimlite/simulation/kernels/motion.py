@@ -174,11 +174,11 @@ def move(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
                 turn, shift = times(rate, turn), times(rate, shift)
             else:
                 # The origin goes to the law, and what it finds comes back.
-                found = at(w, SCRATCH)
-                put(found, 0, origin)
+                result = at(w, SCRATCH)
+                put(result, 0, origin)
                 status = max(status, call(s[LAWS + j[FUNCTION] + BALL_MOVES], s, x, w, y, f, operation))
-                turn, shift = vector(found, 0), vector(found, 3)
-                acceleration, spin_rate = plus(acceleration, vector(found, 6)), plus(spin_rate, vector(found, 9))
+                turn, shift = vector(result, 0), vector(result, 3)
+                acceleration, spin_rate = plus(acceleration, vector(result, 6)), plus(spin_rate, vector(result, 9))
             # The axes are carried around by what moved before.
             spin_rate = plus(spin_rate, cross(spin, turn))
             acceleration = plus(acceleration, plus(cross(velocity, turn), cross(spin, shift)))

@@ -234,9 +234,9 @@ def choose(
             continue
         for k in range(size):
             errors[k] = ERROR_CONSTANT[WIDTH * method + other] * rows[size * (other + 1) + k]
-        found = reach(error_norm(s, y0, errors, h, 1) / accuracy, other)
-        if found > factor:
-            best, factor = other, found
+        result = reach(error_norm(s, y0, errors, h, 1) / accuracy, other)
+        if result > factor:
+            best, factor = other, result
     factor = min(safety * factor, GROW)
     if factor >= WORTH or factor < 1.0:
         h[ORDER], h[EQUAL] = float(best), 0.0

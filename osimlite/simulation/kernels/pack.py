@@ -131,7 +131,7 @@ def _operations(
     chain: list[Motion] = [Fixed(mobilizer.parent_frame), *mobilizer.motions, Fixed(inverse(mobilizer.child_frame))]
     if mobilizer.reversed:
         chain.reverse()
-    found: list[_Operation] = []
+    result: list[_Operation] = []
     of_motion: dict[int, _Operation] = {}
     drifts: list[tuple[_Operation, SimbodyAccelerationError]] = []
     for motion in chain:
@@ -142,8 +142,8 @@ def _operations(
         elif isinstance(motion, SimbodyAccelerationError):
             if motion.elementary() and not free.isdisjoint(own):
                 sign = -1 if mobilizer.reversed else 1
-                found.append(_Operation(at.DRIFT, frame, [], looked_at=[sign, *own[:2]]))
-                drifts.append((found[-1], motion))
+                result.append(_Operation(at.ACCELERATION_ERROR, frame, [], looked_at=[sign, *own[:2]]))
+                drifts.append((result[-1], motion))
                 frame = np.eye(4)
         elif still:
             q = np.zeros(len(own))
@@ -155,23 +155,23 @@ def _operations(
             function = None if motion.function == IDENTITY else motion.function
             if motion.kind == "rotate":
                 turned = transform(_to_axis(axis))
-                found.append(_Operation(at.TURN, frame @ turned, places, function))
-                of_motion[id(motion)] = found[-1]
+                result.append(_Operation(at.TURN, frame @ turned, places, function))
+                of_motion[id(motion)] = result[-1]
                 frame = inverse(turned)
             else:
-                found.append(_Operation(at.SLIDE, frame, places, function, axis=axis))
+                result.append(_Operation(at.SLIDE, frame, places, function, axis=axis))
                 frame = np.eye(4)
         elif isinstance(motion, SphericalMotion):
             kind = at.BALL_BACK if mobilizer.reversed else at.BALL
-            found.append(_Operation(kind, frame, places, radii=motion.radii))
+            result.append(_Operation(kind, frame, places, radii=motion.radii))
             frame = np.eye(4)
         else:
             raise UnsupportedError(f"the {type(motion).__name__} of '{mobilizer.joint}' cannot be computed")
-    for operation in found:
+    for operation in result:
         operation.joint = mobilizer.joint
     for operation, drift in drifts:
         operation.turns = [of_motion.get(id(turn)) for turn in drift.turns]
-    return found, frame
+    return result, frame
 
 
 def _to_axis(axis: Array) -> Array:
@@ -259,7 +259,7 @@ class Packer:
 
             pack_chain(self, self.chain)
         ints[at.WORK_CONTROL] = self.room(len(self.controls.names))
-        found = self.item_records()
+        result = self.item_records()
         self.control_record()
         ints[at.STATE_SIZE] = self.state.size
         ints[at.WORK_STATE] = self.room(ints[at.STATE_SIZE] * STATES)
@@ -267,7 +267,7 @@ class Packer:
         structure, numbers = np.array(ints, dtype=np.int64), np.array(self.numbers, dtype=np.float64)
         laws = tuple(dict.fromkeys(self.laws))
         asked = self.kernels, self.equilibria, self.responses, self.owners
-        return Packed(structure, numbers, laws, *asked, order, self.places.placements, found)
+        return Packed(structure, numbers, laws, *asked, order, self.places.placements, result)
 
     def room(self, count: int) -> int:
         """Place of some more numbers in the work vector."""
@@ -321,7 +321,7 @@ class Packer:
             extra = len(self.numbers)
             freedoms = [self.places.freedom(place) for place in item.arguments]
             looked_at: list[int] = []
-            if item.kind == at.DRIFT:
+            if item.kind == at.ACCELERATION_ERROR:
                 law = self.law("place_drift")
                 self.law("move_drift")
                 sign, *watched = item.looked_at
@@ -388,14 +388,14 @@ class Packer:
         pairs: list[int] = []
         settling: dict[int, str] = {}
         responding: dict[int, Response] = {}
-        found: list[list[tuple[int, int]]] = []
+        result: list[list[tuple[int, int]]] = []
         places = {CONTROLS: self.ints[at.WORK_CONTROL]}
         for owner, (element, group) in enumerate(zip(self.elements, groups, strict=True)):
-            found.append([])
+            result.append([])
             first = len(pairs)
             for item in group:
                 place = contact + at.CONTACT_WORK * len(pairs) if item.is_contact else self.room(item.room)
-                found[-1].append((place, at.CONTACT_WORK if item.is_contact else item.room))
+                result[-1].append((place, at.CONTACT_WORK if item.is_contact else item.room))
                 if item.is_contact:
                     pairs.append(len(self.ints))
                 if not item.is_part:
@@ -426,7 +426,7 @@ class Packer:
         for place, response in responding.items():
             self.responses[len(self.ints)] = response.kernel
             self.ints += [0, place, at.OWN + response.first_state, response.states, response.sense]
-        return found
+        return result
 
     def control_record(self) -> None:
         """Write the controls, if there are any, behind all else: some motions have others there."""

@@ -70,7 +70,7 @@ def _followed(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, list[in
         if operation.joint != joint.source:
             continue
         is_ball = operation.kind in (at.BALL, at.BALL_BACK)
-        if operation.kind == at.DRIFT and isinstance(function, AccelerationErrorAngle):
+        if operation.kind == at.ACCELERATION_ERROR and isinstance(function, AccelerationErrorAngle):
             return at.ERROR, number, function.component, []
         if is_ball and isinstance(function, EllipsoidPoint):
             return at.ELLIPSOID, number, function.component, freedoms
@@ -90,26 +90,26 @@ def _products(packer: Packer, shares: Sequence[tuple[int, int]], count: int) -> 
     of_freedom: dict[int, list[tuple[int, int]]] = defaultdict(list)
     for number, (joint, freedom) in enumerate(shares):
         of_freedom[freedom].append((number, joint))
-    found: list[int] = []
+    result: list[int] = []
     freedoms = packer.ints[packer.ints[at.FREEDOM_AT] :]
     for freedom in range(packer.ints[at.FREEDOMS]):
         place, other = freedoms[at.FREEDOM_INTS * freedom + at.ROW], freedom
         while other >= 0:
             for one, i in of_freedom[freedom]:
                 for two, j in of_freedom[other]:
-                    found += one, two, count * i + j, place
+                    result += one, two, count * i + j, place
             place, other = place + 1, freedoms[at.FREEDOM_INTS * other + at.ABOVE]
-    return found
+    return result
 
 
 def _excesses(packer: Packer, excess: Sequence[tuple[int, float]]) -> list[int]:
     """Link, last degree of freedom on the way to it, and place of the number."""
-    found: list[int] = []
+    result: list[int] = []
     for body, moment in excess:
         link = carrier = packer.places.placements[body].link
         while carrier != GROUND and packer.ends[carrier] == packer.ends[carrier + 1]:
             carrier = packer.links[carrier].parent
         if carrier != GROUND:
-            found += link, packer.ends[carrier + 1] - 1, len(packer.numbers)
+            result += link, packer.ends[carrier + 1] - 1, len(packer.numbers)
             packer.numbers.append(moment)
-    return found
+    return result

@@ -84,18 +84,18 @@ def wrapped_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int)
     for turn in range(ROUNDS if wraps > 1 else 1):
         first = second = NONE
         for k in range(wraps):
-            found = wrap(s, x, w, y, f, item, 1 - k if exchanged and k < 2 else k)
-            if found == NOWHERE:
+            result = wrap(s, x, w, y, f, item, 1 - k if exchanged and k < 2 else k)
+            if result == NOWHERE:
                 measure_points(s, w, y, item)
                 return OK
-            if found == BEYOND:
+            if result == BEYOND:
                 record = at(w, s[item + RECORD])
                 record[LENGTH] = record[SPEED] = nan
                 return UNSOLVED
             if k == 0:
-                first = found
+                first = result
             elif k == 1:
-                second = found
+                second = result
         before, length = length, measure_points(s, w, y, item)
         if abs(length - before) < STILL:
             break
@@ -121,23 +121,23 @@ def place_surfaces(s: Ints, x: Floats, w: Floats, item: int) -> None:
 
 def take_out(s: Ints, w: Floats, item: int, number: int) -> None:
     """Take the tangent points of a wrap out of the path, if they are in it."""
-    i, found = at(s, item), at(w, s[item + RECORD])
-    order, count, first = at(found, ORDER), int(found[COUNT]), i[POINTS] + 2 * number
+    i, result = at(s, item), at(w, s[item + RECORD])
+    order, count, first = at(result, ORDER), int(result[COUNT]), i[POINTS] + 2 * number
     kept = 0
     for k in range(count):
         if not first <= order[k] <= first + 1:
             order[kept] = order[k]
             kept += 1
-    found[COUNT] = kept
+    result[COUNT] = kept
 
 
 def wrap(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int, number: int) -> int:
     """Find the way around one surface; returns what became of the last piece that was tried."""
     take_out(s, w, item, number)
-    i, found = at(s, item), at(w, s[item + RECORD])
-    points, count = i[POINTS], int(found[COUNT])
+    i, result = at(s, item), at(w, s[item + RECORD])
+    points, count = i[POINTS], int(result[COUNT])
     size = points + 2 * i[WRAPS]
-    nodes, order, work = at(i, NODES_AT), at(found, ORDER), at(found, ORDER + size)
+    nodes, order, work = at(i, NODES_AT), at(result, ORDER), at(result, ORDER + size)
     own, tangent = at(nodes, NODE_INTS * size + WRAP_INTS * number), points + 2 * number
     if own[BACK] == 0:
         return NONE
@@ -183,7 +183,7 @@ def wrap(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int, number:
         for k in range(count - 1, best, -1):
             order[k + 2] = order[k]
         order[best + 1], order[best + 2] = tangent, tangent + 1
-        found[COUNT] = count + 2
+        result[COUNT] = count + 2
     return says
 
 

@@ -65,8 +65,8 @@ there, and nothing here."""
 def path_length(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, path: int) -> tuple[float, float]:
     """Length and lengthening speed of the path of an item."""
     call(s[path + LAW], s, x, w, y, f, path)
-    found = at(w, s[path + RECORD])
-    return found[LENGTH], found[SPEED]
+    result = at(w, s[path + RECORD])
+    return result[LENGTH], result[SPEED]
 
 
 def pull_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, path: int, tension: float) -> None:
@@ -85,8 +85,8 @@ def straight_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int
 def place_points(s: Ints, x: Floats, w: Floats, y: Floats, item: int) -> None:
     """Where the points are, and which of them the path runs through."""
     i, p = at(s, item), at(x, s[item + NUMBERS])
-    found = at(w, i[RECORD])
-    order, work = at(found, ORDER), at(found, ORDER + i[POINTS] + 2 * i[WRAPS])
+    result = at(w, i[RECORD])
+    order, work = at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
     count = 0
     for number in range(i[POINTS]):
         node, here = at(i, NODES_AT + NODE_INTS * number), at(work, NODE_WORK * number)
@@ -115,15 +115,15 @@ def place_points(s: Ints, x: Floats, w: Floats, y: Floats, item: int) -> None:
         put(here, PLACE, station(s, w, node[LINK], point))
         order[count] = number
         count += 1
-    found[COUNT] = count
+    result[COUNT] = count
 
 
 def measure_points(s: Ints, w: Floats, y: Floats, item: int) -> float:
     """Length, speed and directions, from the places of the nodes that the path runs through; returns the length."""
-    i, found = at(s, item), at(w, s[item + RECORD])
-    nodes, order, work = at(i, NODES_AT), at(found, ORDER), at(found, ORDER + i[POINTS] + 2 * i[WRAPS])
+    i, result = at(s, item), at(w, s[item + RECORD])
+    nodes, order, work = at(i, NODES_AT), at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
     length = speed = 0.0
-    for k in range(1, int(found[COUNT])):
+    for k in range(1, int(result[COUNT])):
         one, two = int(order[k - 1]), int(order[k])
         m, n = at(nodes, NODE_INTS * one), at(nodes, NODE_INTS * two)
         a, b = at(work, NODE_WORK * one), at(work, NODE_WORK * two)
@@ -137,7 +137,7 @@ def measure_points(s: Ints, w: Floats, y: Floats, item: int) -> float:
             moves = minus(node_velocity(s, w, y, n, b), node_velocity(s, w, y, m, a))
             speed += norm(moves) if distance < COINCIDENT else dot(moves, way) / distance
         put(a, ALONG, times(0.0 if distance < SIGNIFICANT else 1.0 / distance, way))
-    found[LENGTH], found[SPEED] = length, speed
+    result[LENGTH], result[SPEED] = length, speed
     return length
 
 
@@ -164,9 +164,9 @@ def pull_points(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) 
 
     A moving point works on its coordinate too.
     """
-    i, found = at(s, item), at(w, s[item + RECORD])
-    nodes, order, work = at(i, NODES_AT), at(found, ORDER), at(found, ORDER + i[POINTS] + 2 * i[WRAPS])
-    tension, last = found[TENSION], int(found[COUNT]) - 1
+    i, result = at(s, item), at(w, s[item + RECORD])
+    nodes, order, work = at(i, NODES_AT), at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
+    tension, last = result[TENSION], int(result[COUNT]) - 1
     pull = 0.0, 0.0, 0.0
     for k in range(last + 1):
         number = int(order[k])

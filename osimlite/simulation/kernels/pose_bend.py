@@ -57,8 +57,8 @@ def twisted(load: Floats, turned: Floats, turn: Vector, shift: Vector) -> Vector
     """
     trace = turned[0] + turned[4] + turned[8]
     x, y, z = turn
-    found = along(along(times(x, vector(turned, 0)), y, vector(turned, 3)), z, vector(turned, 6))
-    return along(plus(cross(shift, vector(load, 3)), found), -trace, turn)
+    result = along(along(times(x, vector(turned, 0)), y, vector(turned, 3)), z, vector(turned, 6))
+    return along(plus(cross(shift, vector(load, 3)), result), -trace, turn)
 
 
 def bend_joint(m: Fit, y: Floats, link: int, load: Floats, turned: Floats) -> None:

@@ -224,9 +224,9 @@ def descend_again(
     free_ends(m)
     if not settle(m, trial):
         return value, 0, status
-    new, steps, found = descend(m, trial, y, cost(m, trial), damping, lightest)
+    new, steps, result = descend(m, trial, y, cost(m, trial), damping, lightest)
     if new < value * (1.0 - 1e-7) - 1e-20:
-        return new, steps, found
+        return new, steps, result
     copy(size, best, y)
     return value, steps, status
 

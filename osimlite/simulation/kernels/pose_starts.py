@@ -59,12 +59,12 @@ def turn_round(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: fl
 
 def joint_to_ground(m: Fit, freedom: int) -> int:
     """The link whose joint to ground has this degree of freedom, or -1 if it is of another joint."""
-    s, found = m.s, -1
+    s, result = m.s, -1
     for link in range(s[LINKS]):
         j = at(s, s[LINK_AT] + LINK_INTS * link)
         if j[PARENT] < 0 and j[FIRST_FREEDOM] <= freedom < j[END_FREEDOM]:
-            found = link
-    return found
+            result = link
+    return result
 
 
 def is_angle(m: Fit, freedom: int) -> bool:
@@ -118,18 +118,18 @@ def turn_over(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
 
 def leave_ends(m: Fit, y: Floats, start: Floats) -> bool:
     """A pose in which what is at an end of its range is not; false if there is nothing."""
-    ranges, found = at(m.c, m.p[RANGES_AT]), False
+    ranges, result = at(m.c, m.p[RANGES_AT]), False
     for k in range(m.s[FREEDOMS]):
         low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], y[k]
         if m.p[m.p[RESOLVED_AT] + k] == AT_END and low < high:
             inwards = min(INWARDS, 0.5 * (high - low))
-            start[k], found = low + inwards if y[k] <= low else high - inwards, True
-    return found
+            start[k], result = low + inwards if y[k] <= low else high - inwards, True
+    return result
 
 
 def unwind(m: Fit, y: Floats, first: Floats, start: Floats, value: float) -> bool:
     """A pose without the whole turns that the way from the first one has led to, if it costs no more."""
-    size, ranges, trial, found = m.s[FREEDOMS], at(m.c, m.p[RANGES_AT]), at(m.v, m.p[TRIAL]), False
+    size, ranges, trial, result = m.s[FREEDOMS], at(m.c, m.p[RANGES_AT]), at(m.v, m.p[TRIAL]), False
     copy(size, y, start)
     for k in range(size):
         turns = floor((y[k] - first[k]) / (2.0 * pi) + 0.5)
@@ -139,5 +139,5 @@ def unwind(m: Fit, y: Floats, first: Floats, start: Floats, value: float) -> boo
             trial[k] = near
             if settle(m, trial) and cost(m, trial) <= value * (1.0 + 1e-9) + 1e-20:
                 copy(size, trial, start)
-                found = True
-    return found
+                result = True
+    return result

@@ -91,17 +91,17 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
         solution = solve_free(m, free, damping, 1.0 if bends else 0.0, SMALLEST)
         if solution < 0:
             return False
-        found = at(v, solution)
+        result = at(v, solution)
         again = False
         for k in range(free):
             freedom = p[p[FREE_AT] + k]
-            to = y[freedom] + found[k]
+            to = y[freedom] + result[k]
             end = ranges[2 * freedom] if to < ranges[2 * freedom] else ranges[2 * freedom + 1]
             if to < ranges[2 * freedom] or to > ranges[2 * freedom + 1]:
                 step[freedom], p[p[RESOLVED_AT] + freedom], again = end - y[freedom], AT_END, True
         if not again:
             for k in range(free):
-                step[p[p[FREE_AT] + k]] = found[k]
+                step[p[p[FREE_AT] + k]] = result[k]
             return True
 
 

@@ -118,5 +118,5 @@ def pair_of(surfaces: Ints, pairs: int, one: int, two: int) -> int:
 def separates(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, part: int) -> bool:
     """Compute one contact; whether it touches and does not push."""
     call(s[part + LAW], s, x, w, y, f, part)
-    found = at(w, s[part + RECORD])
-    return bool(found[DEPTH_OF] > 0.0 and found[0] == 0.0 and found[1] == 0.0 and found[2] == 0.0)
+    result = at(w, s[part + RECORD])
+    return bool(result[DEPTH_OF] > 0.0 and result[0] == 0.0 and result[1] == 0.0 and result[2] == 0.0)

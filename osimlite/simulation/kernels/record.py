@@ -155,7 +155,7 @@ def note_events(
     size, pairs = m.s[STATE_SIZE], m.s[CONTACTS]
     stop, first, total, event = inf, counts[EVENTS], pairs + m.sizes[WATCHES], m.sizes[EVENT]
     ya = at(m.w, m.s[WORK_STATE] + 4 * size)
-    fa, found = at(ya, size), at(after, total)
+    fa, result = at(ya, size), at(after, total)
     for number in range(total):
         rises = after[number] > 0.0
         if rises == (before[number] > 0.0):
@@ -168,8 +168,8 @@ def note_events(
             inside(m, t0, y0, f0, t1, y1, f1, middle, ya)
             touch = number < pairs or m.watches[3 * (number - pairs)] == TOUCH
             evaluated(m, middle, ya, fa, FORCE_STAGE if touch else POSITION_STAGE)
-            levels_at(m, ya, found)
-            if (found[number] > 0.0) == rises:
+            levels_at(m, ya, result)
+            if (result[number] > 0.0) == rises:
                 high = middle
             else:
                 low = middle

@@ -52,11 +52,11 @@ EMBEDDED = (3.7810903145819369e-01, -9.6042292212423178e-02, 0.5, 2.179332607542
 
 def _by_gamma(row: tuple[float, ...]) -> tuple[float, ...]:
     """A row times the inverse of GAMMA."""
-    found = [0.0] * STAGES
+    result = [0.0] * STAGES
     for j in range(STAGES - 1, -1, -1):
-        rest = sum(found[i] * GAMMA[i][j] for i in range(j + 1, STAGES))
-        found[j] = (row[j] - rest) / DIAGONAL
-    return tuple(found)
+        rest = sum(result[i] * GAMMA[i][j] for i in range(j + 1, STAGES))
+        result[j] = (row[j] - rest) / DIAGONAL
+    return tuple(result)
 
 
 UNIT = tuple(tuple(float(i == j) for j in range(STAGES)) for i in range(STAGES))

@@ -39,13 +39,13 @@ def trace_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
 
     After the wraps among the integers of the path stand the laws that trace it on each surface, or 0.
     """
-    i, found = at(s, item), at(w, s[item + RECORD])
+    i, result = at(s, item), at(w, s[item + RECORD])
     points, wraps = i[POINTS], i[WRAPS]
     size = points + 2 * wraps
-    order, work = at(found, ORDER), at(found, ORDER + size)
+    order, work = at(result, ORDER), at(result, ORDER + size)
     own = at(i, NODES_AT + NODE_INTS * size)
     count = 0
-    for k in range(int(found[COUNT])):
+    for k in range(int(result[COUNT])):
         number = int(order[k])
         put(f, 3 * count, vector(work, NODE_WORK * number + PLACE))
         count += 1

@@ -29,8 +29,10 @@ def compute(analysis: Actuation, motion: Motion, tables: Tables) -> None:
     actuators = [item for item in motion.model.force_set.objects if isinstance(item, Actuator) and item.appliesForce]
     for item in actuators:
         if item.control_count != 1:
-            told = f"'{analysis.name}' asks for one force of '{item.name}', a {type(item).__name__}, which has several"
-            raise NotRunnable(f"{told}; OpenSim crashes there", file=str(tables.job.file))
+            message = (
+                f"'{analysis.name}' asks for one force of '{item.name}', a {type(item).__name__}, which has several"
+            )
+            raise NotRunnable(f"{message}; OpenSim crashes there", file=str(tables.job.file))
     tree = motion.model.tree()
     known = motion.known([tree.path_of(item) or "" for item in actuators], "actuation", "speed")
     force, speed = known["actuation"], known["speed"]

@@ -20,7 +20,7 @@ def compute(analysis: BodyKinematics, motion: Motion, tables: Tables) -> None:
     bodies, tree = motion.model.body_set.objects, motion.model.tree()
     places = {body.path: place for place, body in enumerate(motion.mechanism.bodies)}
     local, total = analysis.express_results_in_body_local_frame, sum(body.mass for body in bodies) or 1.0
-    found, whole = [], np.zeros((3, len(motion.times), 3))
+    result, whole = [], np.zeros((3, len(motion.times), 3))
     for body in bodies:
         place = places[tree.path_of(body) or ""]
         linear = np.array(motion.links.point(place, np.array(body.mass_center)))
@@ -31,12 +31,12 @@ def compute(analysis: BodyKinematics, motion: Motion, tables: Tables) -> None:
             rows[1:] = rows[1:] @ rotation
         if analysis.in_degrees:
             rows[:, :, 1] = np.degrees(rows[:, :, 1])
-        found.append(rows.reshape(3, -1, 6))
+        result.append(rows.reshape(3, -1, 6))
     names = [body.name for body in bodies]
     chosen = motion.chosen(analysis.bodies, [*names, WHOLE], f"bodies of '{analysis.name}'")
     own = [place for place in chosen if place < len(names)]
     columns = [f"{names[place]}_{what}" for place in own for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")]
-    parts = [np.empty((3, len(motion.times), 0)), *(found[place] for place in own)]
+    parts = [np.empty((3, len(motion.times), 0)), *(result[place] for place in own)]
     if len(names) in chosen:
         parts.append(whole)
         columns += [f"{WHOLE}_{axis}" for axis in "XYZ"]

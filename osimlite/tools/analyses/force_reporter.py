@@ -27,6 +27,6 @@ def compute(analysis: ForceReporter, motion: Motion, tables: Tables) -> None:
     stored = {f"{force.name}.{ENERGY}" for force in motion.model.components(CoordinateLimitForce)}
     labels = [ENERGY if label in stored else label for label in engine.columns]
     if analysis.include_constraint_forces and motion.simulation.constraints:
-        more, found = recorded(motion)
-        labels, rows = labels + more, np.hstack([rows, found])
+        more, result = recorded(motion)
+        labels, rows = labels + more, np.hstack([rows, result])
     tables.add("forces", "ModelForces", labels, rows, description=DESCRIPTION)

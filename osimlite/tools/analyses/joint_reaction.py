@@ -87,11 +87,11 @@ def _base(model: Model, joint: Joint, end: str) -> str:
 
 def _frame(motion: Motion, asked: str, bases: dict[str, str], tables: Tables) -> str:
     """The path of a frame that is asked for by a word or as OpenSim finds it: in the model, its bodies, its joints."""
-    found = motion.frame(asked, "Frame", "/bodyset", "/jointset") or bases.get(asked.lower())
-    if found is None:
-        told = f"express_in_frame has '{asked}', which is no frame of the model; say child, parent or a frame"
-        raise tables.job.error(told)
-    return found
+    result = motion.frame(asked, "Frame", "/bodyset", "/jointset") or bases.get(asked.lower())
+    if result is None:
+        message = f"express_in_frame has '{asked}', which is no frame of the model; say child, parent or a frame"
+        raise tables.job.error(message)
+    return result
 
 
 def _last(path: str) -> str:
@@ -121,8 +121,8 @@ def _overridden(analysis: JointReaction, motion: Motion, tables: Tables) -> tupl
     for item in actuators:
         other = ideal(item, 1.0)
         if other is None or id(item) not in places:
-            told = f"the {type(item).__name__} '{item.name}' cannot push as '{path}' says, which is not done yet"
-            raise NotRunnable(told, file=str(tables.job.file))
+            message = f"the {type(item).__name__} '{item.name}' cannot push as '{path}' says, which is not done yet"
+            raise NotRunnable(message, file=str(tables.job.file))
         model.force_set.objects[places[id(item)]] = other
     simulation = simulation_of(tables.job, model)
     forces = {item.name: (table.times, table[item.name]) for item in actuators}

@@ -29,21 +29,21 @@ def compute(analysis: MuscleAnalysis, motion: Motion, tables: Tables) -> None:
         why = "which it cannot analyse yet" if type(muscle) not in CHECKED else ""
         why = why or ("" if muscle.appliesForce else "which applies no force")
         if why:
-            told = f"'{analysis.name}' asks for '{muscle.name}', a {type(muscle).__name__}, {why}"
-            raise NotRunnable(told, file=str(tables.job.file))
+            message = f"'{analysis.name}' asks for '{muscle.name}', a {type(muscle).__name__}, {why}"
+            raise NotRunnable(message, file=str(tables.job.file))
     names = [muscle.name for muscle in muscles]
-    found = _of_all(motion, muscles)
+    result = _of_all(motion, muscles)
     if not motion.mechanism.total_mass > np.finfo(float).eps:
-        found |= {suffix: np.full_like(found[suffix], np.nan) for suffix in OF_DYNAMICS}
-    for suffix, rows in found.items():
+        result |= {suffix: np.full_like(result[suffix], np.nan) for suffix in OF_DYNAMICS}
+    for suffix, rows in result.items():
         tables.add(suffix, suffix, names, rows, description=_DESCRIPTION)
     if analysis.compute_moments:
-        _add_moments(analysis, motion, tables, muscles, found["TendonForce"])
+        _add_moments(analysis, motion, tables, muscles, result["TendonForce"])
 
 
 def _of_all(motion: Motion, muscles: list[Muscle]) -> dict[str, Array]:
     """The tables (t, m) of muscles of whatever classes."""
-    found: dict[str, Array] = {}
+    result: dict[str, Array] = {}
     tree = motion.model.tree()
     for cls in dict.fromkeys(map(type, muscles)):
         own = [place for place, muscle in enumerate(muscles) if type(muscle) is cls]
@@ -52,8 +52,8 @@ def _of_all(motion: Motion, muscles: list[Muscle]) -> dict[str, Array]:
         with np.errstate(invalid="ignore", divide="ignore"):
             of_class = quantities(motion.known(paths, *names), [muscles[place] for place in own])
         for suffix, rows in of_class.items():
-            found.setdefault(suffix, np.empty((len(motion.times), len(muscles))))[:, own] = rows
-    return found
+            result.setdefault(suffix, np.empty((len(motion.times), len(muscles))))[:, own] = rows
+    return result
 
 
 def _add_moments(
@@ -66,6 +66,6 @@ def _add_moments(
     asked = ["all" if str(name).lower() == "all" else name for name in analysis.moment_arm_coordinate_list]
     for place in motion.chosen(asked, [info.name for info in infos], f"coordinates of '{analysis.name}'"):
         names, own = [muscle.name for muscle in muscles], arms[:, :, place]
-        for what, found in (("MomentArm", own), ("Moment", own * tension)):
+        for what, result in (("MomentArm", own), ("Moment", own * tension)):
             title = f"{what}_{infos[place].name}"
-            tables.add(title, title, names, found, description=_DESCRIPTION)
+            tables.add(title, title, names, result, description=_DESCRIPTION)

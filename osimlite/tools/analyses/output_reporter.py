@@ -42,8 +42,10 @@ def compute(analysis: OutputReporter, motion: Motion, tables: Tables) -> None:
             near = did_you_mean(parts["output"], outputs)
             raise tables.job.error(f"'{path}' has no output '{parts['output']}' for '{analysis.name}'{near}")
         if reader is None or parts["channel"]:
-            told = f"'{analysis.name}' asks for '{asked}' of a {type(component).__name__}, which cannot be computed yet"
-            raise NotRunnable(told, file=str(tables.job.file))
+            message = (
+                f"'{analysis.name}' asks for '{asked}' of a {type(component).__name__}, which cannot be computed yet"
+            )
+            raise NotRunnable(message, file=str(tables.job.file))
         columns[kind].append(parts["alias"] or f"{path}|{parts['output']}")
         rows[kind].append(reader(motion, component, path))
     if left_out:

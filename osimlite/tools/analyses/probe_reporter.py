@@ -23,8 +23,8 @@ def compute(analysis: ProbeReporter, motion: Motion, tables: Tables) -> None:
     computed = {probe.path for probe in engine.probes}
     for probe in motion.model.components(Probe):
         if probe.enabled and tree.path_of(probe) not in computed:
-            told = f"'{analysis.name}' asks for '{probe.name}', a {type(probe).__name__} that cannot be computed"
-            raise NotRunnable(told, file=str(tables.job.file))
+            message = f"'{analysis.name}' asks for '{probe.name}', a {type(probe).__name__} that cannot be computed"
+            raise NotRunnable(message, file=str(tables.job.file))
     rows = np.array(list(probe_rows(engine, [*motion.moments], motion.steps))).reshape(len(motion.times), -1)
     # Components with outputs are reported in a run, and not here.
     shown = [issubclass(probe.component, Probe) for probe in engine.probes for _ in probe.reading.labels]

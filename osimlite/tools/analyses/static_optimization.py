@@ -19,11 +19,11 @@ def compute(analysis: Setup, motion: Motion, tables: Tables) -> None:
     """Write activations, forces and controls; what has no solution is no number there, and told."""
     job = tables.job
     if motion.record is None:
-        told = f"'{analysis.name}' cannot be computed of a motion that was not measured; give it to an AnalyzeTool"
-        raise NotRunnable(told, file=str(job.file))
+        message = f"'{analysis.name}' cannot be computed of a motion that was not measured; give it to an AnalyzeTool"
+        raise NotRunnable(message, file=str(job.file))
     if not analysis.use_model_force_set:
-        told = f"'{analysis.name}' has use_model_force_set off, with which OpenSim crashes; set it to true"
-        raise NotRunnable(told, file=str(job.file))
+        message = f"'{analysis.name}' has use_model_force_set off, with which OpenSim crashes; set it to true"
+        raise NotRunnable(message, file=str(job.file))
     problem = StaticOptimization(
         motion.model,
         motion.mechanism,

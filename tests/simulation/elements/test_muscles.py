@@ -99,9 +99,9 @@ def test_equilibrium(case, code):
             with pytest.raises(SimulationError, match=NOWHERE):
                 ready.equilibrated(float(number), y)
             continue
-        found = ready.equilibrated(float(number), y)
+        result = ready.equilibrated(float(number), y)
         expected = [float(row.get(f"eq_{name}") or value) for name, value in zip(states(ready), start, strict=True)]
-        assert found[:2] == y[:2] and found[2:] == pytest.approx(expected, rel=1e-12, abs=1e-14), number
+        assert result[:2] == y[:2] and result[2:] == pytest.approx(expected, rel=1e-12, abs=1e-14), number
 
 
 def test_a_motion_may_start_in_equilibrium():

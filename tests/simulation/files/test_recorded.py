@@ -32,8 +32,8 @@ def arm() -> Mechanism:
     )
     for kind, name, parent, child in ((BallJoint, "shoulder", model.ground, inner), (PinJoint, "elbow", inner, outer)):
         joint = model.add(kind(name=name).between(parent, child, at=(0.1, 0.3, 0.2), turned=(0.4, 0.1, 0.2)))
-        for place, coordinate in enumerate(joint.coordinates):
-            coordinate.name = f"{name}_{place}"
+        for index, coordinate in enumerate(joint.coordinates):
+            coordinate.name = f"{name}_{index}"
     model.add(Marker(name="tip", socket_parent_frame=outer, location=(0.1, 0.2, 0.3)))
     return build_mechanism(model)
 

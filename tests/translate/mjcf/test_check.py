@@ -50,12 +50,12 @@ def test_what_is_wrong_is_found(model, text, tmp_path):
         'joint1="ankle_angle_r"', 'joint1="foot"'
     )
     check = checked(model, wrong, tmp_path)
-    found = {muscle.name: muscle for muscle in check.muscles}
+    result = {muscle.name: muscle for muscle in check.muscles}
     assert check.coordinates == ("ankle_angle_r",)
-    assert found["soleus_r"].fiber == pytest.approx(1.0 + 0.01 / (high - low))
-    assert found["soleus_r"].tendon == pytest.approx(0.01)
+    assert result["soleus_r"].fiber == pytest.approx(1.0 + 0.01 / (high - low))
+    assert result["soleus_r"].tendon == pytest.approx(0.01)
     assert soleus.tendon_slack_length == pytest.approx(low)
-    assert found["soleus_r"].length.rms > 1e-3 and found["soleus_l"].length.max < 1e-4
+    assert result["soleus_r"].length.rms > 1e-3 and result["soleus_l"].length.max < 1e-4
 
 
 def test_files_that_cannot_be_compared(model, tmp_path):

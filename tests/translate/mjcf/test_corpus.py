@@ -20,19 +20,19 @@ from tests.translate.test_export import unaccounted
 
 def assert_refused(corpus_model: CorpusModel, error: OsimliteError) -> None:
     """What is refused here, reading or simulation refuses with the same words."""
-    with pytest.raises(type(error)) as found:
+    with pytest.raises(type(error)) as result:
         model = osimlite.read(corpus_model.path)
         osimlite.simulate(model, to=1e-6, folder=corpus_model.path.parent, skip_unsupported=True)
-    assert found.value.message == error.message
+    assert result.value.message == error.message
 
 
 def random_pose(mechanism: Mechanism, random: np.random.Generator) -> Array:
     """A pose in the ranges, as far as they mean anything, that fulfils locks and couplers."""
     q = mechanism.values({})
-    for place, info in enumerate(mechanism.coordinates):
+    for index, info in enumerate(mechanism.coordinates):
         low, high = info.range
         if not info.locked:
-            q[place] = random.uniform(low, high) if 0.0 <= high - low <= 4.0 * np.pi else q[place] + random.uniform()
+            q[index] = random.uniform(low, high) if 0.0 <= high - low <= 4.0 * np.pi else q[index] + random.uniform()
     for coupler in mechanism.constraints:
         if isinstance(coupler, Coupler):
             q[coupler.dependent] = coupler.function.evaluate(q[list(coupler.independent)])[0]
@@ -75,8 +75,8 @@ def test_real_models(corpus_model):
         own.place(q)
         state = mechanism.at(q)
         for index, body in enumerate(mechanism.bodies):
-            found = own.body(mjcf.robot.link_of[body.path][0].name)
-            np.testing.assert_allclose(found, state.transform(index), rtol=0.0, atol=1e-9)
+            result = own.body(mjcf.robot.link_of[body.path][0].name)
+            np.testing.assert_allclose(result, state.transform(index), rtol=0.0, atol=1e-9)
         rates = np.linalg.inv(mechanism.rate_matrix(q))
         wanted = (rates.T @ mechanism.mass_matrix(q) @ rates)[np.ix_(free, free)]
         scale = max(1.0, np.abs(wanted).max(initial=0.0))

@@ -43,15 +43,15 @@ def on_a_function(function, *, range=(-1.0, 2.0), name="tx") -> Model:
 
 def equalities(compiled: Compiled) -> dict[str, tuple[str | None, np.ndarray]]:
     """The leader and the polynomial of every joint that follows, as MuJoCo has them."""
-    model, found = compiled.model, {}
+    model, result = compiled.model, {}
     for k in range(model.neq):
         if model.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT:
             leader = model.eq_obj2id[k]
-            found[model.joint(model.eq_obj1id[k]).name] = (
+            result[model.joint(model.eq_obj1id[k]).name] = (
                 model.joint(leader).name if leader >= 0 else None,
                 model.eq_data[k, :5],
             )
-    return found
+    return result
 
 
 def off(compiled: Compiled, q: np.ndarray) -> dict[str, float]:

@@ -105,9 +105,9 @@ FORCES = {
 def test_generalized_forces_are_those_of_opensims_law(force):
     model = chain(force)
     for q, u in (((0.1, 0.2, -0.3, 0.4, 0.5), (1.0, -2.0, 0.5, 0.7, 3.0)), ((-0.4, 1.0, 0.9, -0.8, 0.1), np.zeros(5))):
-        found, wanted = both(model, q, u)
+        result, wanted = both(model, q, u)
         assert np.abs(wanted).max() > 0.1
-        np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(result, wanted, rtol=1e-9, atol=1e-9)
     assert not to_mjcf(model).fidelity.records
 
 
@@ -138,8 +138,8 @@ def test_a_limit_is_off_by_no_more_than_its_record_says(lower):
     (record,) = to_mjcf(model).fidelity.records
     worst = 0.0
     for angle in np.linspace(-0.6, 0.8, 41):
-        found, wanted = both(model, (0.0, angle, 0.0, 0.0, 0.0), np.zeros(5))
-        worst = max(worst, np.abs(found - wanted).max())
+        result, wanted = both(model, (0.0, angle, 0.0, 0.0, 0.0), np.zeros(5))
+        worst = max(worst, np.abs(result - wanted).max())
     assert 0.5 * record.errors["force"].max < worst <= record.errors["force"].max * (1.0 + 1e-9)
     assert record.errors["damping"].max == pytest.approx(0.01 * 180.0 / np.pi)
 
@@ -160,8 +160,8 @@ def test_a_bushing_accelerates_as_opensims_does():
     compiled = Compiled(to_mjcf(model))
     mujoco.mj_resetDataKeyframe(compiled.model, compiled.data, 0)
     mujoco.mj_forward(compiled.model, compiled.data)
-    found = np.array([compiled.data.joint(f"q{k}").qacc[0] for k in range(5)])
-    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-2 * np.abs(wanted).max())
+    result = np.array([compiled.data.joint(f"q{k}").qacc[0] for k in range(5)])
+    np.testing.assert_allclose(result, wanted, rtol=0.0, atol=1e-2 * np.abs(wanted).max())
 
 
 def test_what_cannot_act_is_told():

@@ -44,12 +44,12 @@ def test_tension_is_mujocos(activation):
         </worldbody><tendon><spatial name="t"><site site="a"/><site site="b"/></spatial></tendon>
         <actuator><general tendon="t" lengthrange="0.2 0.3" dyntype="none" gaintype="muscle" biastype="muscle"
         gainprm="{gain}" biasprm="{bias}"/></actuator></mujoco>""")
-    data, lengths, found = mujoco.MjData(model), np.linspace(0.22, 0.45, 40), []
+    data, lengths, result = mujoco.MjData(model), np.linspace(0.22, 0.45, 40), []
     for length in lengths:
         data.qpos[0], data.ctrl[0] = length, activation
         mujoco.mj_forward(model, data)
-        found.append(-data.actuator_force[0])
-    np.testing.assert_allclose(curves.tension(lengths, activation), found, rtol=1e-12, atol=1e-9)
+        result.append(-data.actuator_force[0])
+    np.testing.assert_allclose(curves.tension(lengths, activation), result, rtol=1e-12, atol=1e-9)
     read = Curves.read(model.actuator_lengthrange[0], model.actuator_gainprm[0], model.actuator_biasprm[0])
     assert read == pytest.approx(curves)
 

@@ -106,7 +106,7 @@ def hostile(names: Iterable[str]) -> Model:
             socket_z_coordinate=knee,
         )
         moving.x_location, moving.y_location, moving.z_location = (
-            curve.copy_deep() if place == 0 else LinearFunction(coefficients=(0.0, 0.1)) for place in range(3)
+            curve.copy_deep() if index == 0 else LinearFunction(coefficients=(0.0, 0.1)) for index in range(3)
         )
         points = [
             PathPoint(name=name(), socket_parent_frame=first, location=(0.1, 0.0, 0.0)),

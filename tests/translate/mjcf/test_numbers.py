@@ -40,7 +40,7 @@ def numbers(model: Model) -> list[tuple[Object, str, int | None]]:
             if isinstance(value, float):
                 yield thing, name, None
             elif items and all(isinstance(item, float) for item in items):
-                yield from ((thing, name, place) for place in range(len(items)))
+                yield from ((thing, name, index) for index in range(len(items)))
             for item in items:
                 if isinstance(item, Object) and id(item) not in seen:
                     seen.add(id(item))

@@ -29,13 +29,13 @@ def errors(model, **options):
     """What is wrong with the length of each tendon (P,), m, by name, in poses of their own."""
     mjcf = to_mjcf(model, visuals=False, **options)
     compiled, paths = Compiled(mjcf), osimlite.paths(model)
-    found = {name.rpartition("/")[2]: [] for name in paths.names}
+    result = {name.rpartition("/")[2]: [] for name in paths.names}
     for q in random_values(paths.mechanism, POSES, 5):
         compiled.place(q)
         for name, length in paths.lengths(q).items():
             muscle = name.rpartition("/")[2]
-            found[muscle].append(compiled.data.tendon(muscle).length[0] - length)
-    return mjcf, {name: np.array(row) for name, row in found.items()}
+            result[muscle].append(compiled.data.tendon(muscle).length[0] - length)
+    return mjcf, {name: np.array(row) for name, row in result.items()}
 
 
 def of(corpus, number):
@@ -43,7 +43,7 @@ def of(corpus, number):
 
 
 def test_lengths_are_off_by_what_fidelity_says(corpus):
-    mjcf, found = errors(of(corpus, "m0005"))
+    mjcf, result = errors(of(corpus, "m0005"))
     said = {
         record.detail.removeprefix("tendon "): record.errors["length"]
         for record in mjcf.fidelity
@@ -51,7 +51,7 @@ def test_lengths_are_off_by_what_fidelity_says(corpus):
     }
     assert {"iliopsoas_r", "rect_fem_r", "vasti_l"} <= said.keys()
     assert "soleus_r" not in said
-    for name, off in found.items():
+    for name, off in result.items():
         if name in said:
             assert np.sqrt(np.mean(off**2)) < 2.0 * said[name].rms + 1e-6
         else:
@@ -59,18 +59,18 @@ def test_lengths_are_off_by_what_fidelity_says(corpus):
 
 
 def test_points_that_come_and_go_are_where_openSim_has_them(corpus):
-    _, found = errors(of(corpus, "m0005"))
+    _, result = errors(of(corpus, "m0005"))
     for name in ("iliopsoas_r", "iliopsoas_l", "gastroc_r", "gastroc_l"):
-        assert np.abs(found[name]).max() < 2e-5
+        assert np.abs(result[name]).max() < 2e-5
 
 
 def test_a_locked_coordinate_moves_no_point(corpus):
     model = of(corpus, "m0005")
     knee = model["/jointset/knee_r/knee_angle_r"]
     knee.locked, knee.default_value = True, -1.0
-    _, found = errors(model)
-    assert np.abs(found["vasti_r"]).max() < 3e-4
-    assert np.abs(found["soleus_r"]).max() < 1e-9
+    _, result = errors(model)
+    assert np.abs(result["vasti_r"]).max() < 3e-4
+    assert np.abs(result["soleus_r"]).max() < 1e-9
 
 
 @pytest.mark.parametrize("carrier", ["/ground", "/bodyset/arm"])
@@ -114,7 +114,7 @@ def test_odd_paths_come_to_an_end():
         path.path_point_set.objects.append(point)
     path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="line"))
     model.add(PathActuator(name="cable", geometry_path=path, optimal_force=3.0))
-    mjcf, found = errors(model)
-    assert np.abs(found["cable"]).max() < 1e-9
+    mjcf, result = errors(model)
+    assert np.abs(result["cable"]).max() < 1e-9
     compiled = mujoco.MjModel.from_xml_string(mjcf.text)
     assert compiled.ntendon == compiled.nu == 1 and compiled.actuator_gear[0, 0] == -3.0

@@ -53,8 +53,8 @@ def test_as_mujoco(which, kind, distance, request):
     first, second = ends
     sites = None if side is None else side[None, None]
     one = np.array([0])
-    found = bend(kind, np.array([[RADIUS]]), first[None], second[None], sites, one, int(version.partition(".")[0]))
-    touches, leaves, returns, length = (way[found.choice[0], 0, np.arange(len(first))] for way in found[:4])
+    result = bend(kind, np.array([[RADIUS]]), first[None], second[None], sites, one, int(version.partition(".")[0]))
+    touches, leaves, returns, length = (way[result.choice[0], 0, np.arange(len(first))] for way in result[:4])
     around = np.linalg.norm(leaves - first, axis=1) + length + np.linalg.norm(second - returns, axis=1)
     whole = np.where(touches, around, np.linalg.norm(second - first, axis=1))
     assert 0.05 < touches.mean() < 0.95

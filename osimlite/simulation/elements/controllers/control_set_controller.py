@@ -22,10 +22,10 @@ def drives(builder: ElementBuilder, controller: ControlSetController) -> Iterato
     if controller.controls_file in ("", "Unassigned"):
         return
     path = beside(builder.folder, str(controller.controls_file))
-    found = ControlCurves.read(path)
+    result = ControlCurves.read(path)
     driven = named(builder, controller)
     actuators = actuators_by_name(builder)
-    for name in found.actuators:
+    for name in result.actuators:
         if name not in actuators:
             raise ModelError(
                 f"'{builder.path(controller)}' has no actuator for the control '{name}' of its file"
@@ -35,6 +35,6 @@ def drives(builder: ElementBuilder, controller: ControlSetController) -> Iterato
         if all(item.name != name for item in driven):
             driven.append(actuators[name])
     for actuator in driven:
-        curve = found.of(actuator.name)
+        curve = result.of(actuator.name)
         if curve is not None:
             yield Drive(actuator, curve)

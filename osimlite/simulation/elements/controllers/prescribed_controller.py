@@ -52,7 +52,7 @@ def _from_file(builder: ElementBuilder, controller: PrescribedController, taken:
     if builder.model.document_version < LISTS_OF_PATHS:
         known |= {item.name for item in taken}
     taken = list(taken)
-    for place, label in enumerate(table.columns):
+    for index, label in enumerate(table.columns):
         if label in known:
             continue
         if label not in actuators:
@@ -70,4 +70,4 @@ def _from_file(builder: ElementBuilder, controller: PrescribedController, taken:
         known.add(label)
         taken.append(actuator)
         degree = 1 if controller.interpolation_method is None else controller.interpolation_method
-        yield Drive(actuator, column_function(table, place, degree, f"the interpolation_method of '{path}'"))
+        yield Drive(actuator, column_function(table, index, degree, f"the interpolation_method of '{path}'"))

@@ -99,9 +99,9 @@ class OnBodies(Geometry):
         links = [places.placement(body).link for body in place.bodies]
         numbers: list[float] = []
         for body, point in place.points:
-            link, found = places.station(body, point)
+            link, result = places.station(body, point)
             links.append(link)
-            numbers += found
+            numbers += result
         for body, along in place.directions:
             links.append(places.placement(body).link)
             numbers += places.direction(body, along)
@@ -199,11 +199,11 @@ class AtStation(Geometry):
 
     def read(self, builder: ElementBuilder, force: Any) -> NamedStation:
         """The station that a force names."""
-        found = builder.target(force, "socket_station", force.socket_station)
-        body, placed = builder.placement(builder.target(found, "socket_parent_frame", found.socket_parent_frame))
-        point = triple(placed[:3, :3] @ found.location + placed[:3, 3])
+        result = builder.target(force, "socket_station", force.socket_station)
+        body, placed = builder.placement(builder.target(result, "socket_parent_frame", result.socket_parent_frame))
+        point = triple(placed[:3, :3] @ result.location + placed[:3, 3])
         builder.check(force, point)
-        return NamedStation(found.name, body, point)
+        return NamedStation(result.name, body, point)
 
     def pack(self, place: NamedStation, places: Places) -> tuple[Sequence[int], Sequence[float]]:
         """Link and point."""

@@ -34,8 +34,8 @@ def _measure(probe: DeclaredProbe, system: Any, t: float, y: Sequence[float]) ->
         forces = state.spread(system.applied(t, y)[count : 2 * count], [0.0] * len(q))
         udot = system.mechanism.acceleration(q, u, forces, time=t)
         powers = (system.mechanism.inverse_dynamics(q, u, udot) - forces) * u
-    found = [raised(float(sum(powers[places])), exponent) for places in driven]
-    return [sum(found)] if is_sum else found
+    result = [raised(float(sum(powers[places])), exponent) for places in driven]
+    return [sum(result)] if is_sum else result
 
 
 PROBE = ProbeKind(JointInternalPowerProbe, _read, measure=_measure)

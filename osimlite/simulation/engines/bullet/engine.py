@@ -143,9 +143,9 @@ class BulletEngine(KernelEngine):
         values, rates, biases = w[self._moves : first].reshape(3, -1)
         count, applied = len(values), f[size : 2 * size]
         forces = self.joint_forces(y.tolist(), applied)
-        found = self._body.accelerations_by_step(values.tolist(), rates.tolist(), forces)
+        result = self._body.accelerations_by_step(values.tolist(), rates.tolist(), forces)
         applied[:] = 0.0
-        w[first : first + count] = biases - found
+        w[first : first + count] = biases - result
         w[first + count : first + count + count * count] = np.eye(count).ravel()
 
     def joint_forces(self, y: Sequence[float], forces: Array) -> list[float]:

@@ -188,13 +188,13 @@ def read(builder: ElementBuilder, owner: Any) -> ThroughPoints:
     if len(points) < 2:
         raise ModelError(f"the path of '{builder.path(owner)}' has {len(points)} points; give it at least two")
     wraps = path.path_wrap_set.objects
-    found = [builder.target(wrap, "wrap_object", wrap.wrap_object) for wrap in wraps]
-    numbers = {id(surface): number for number, surface in enumerate(found)}
+    result = [builder.target(wrap, "wrap_object", wrap.wrap_object) for wrap in wraps]
+    numbers = {id(surface): number for number, surface in enumerate(result)}
     alone = float(len(wraps) == 1)
     surfaces = []
     # Where a path runs through no point of a range, OpenSim does not look at the wraps that follow in that pose either.
     may_leave = False
-    for wrap, surface in zip(wraps, found, strict=True):
+    for wrap, surface in zip(wraps, result, strict=True):
         if type(surface) not in LAWS:
             raise builder.unsupported(owner, f" around the {kind_of(surface)} '{surface.name}'")
         surfaces.append(_surface(builder, wrap, surface, numbers[id(surface)], alone, len(points)))
