@@ -31,7 +31,7 @@ import osimlite
 from _corpus import CORPUS
 from _pair import Pair, pair, report
 from osimlite.simulation import Simulation
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import STAGE
 from osimlite.simulation.system import System
 from osimlite.sweep.plan import plan
 from osimlite.sweep.runner import Runner
@@ -124,7 +124,7 @@ def evaluations(simulation: Simulation) -> Callable[[], None]:
 
     def run() -> None:
         for y in states:
-            engine.realize(0.0, y, layout.ACCELERATION_STAGE)
+            engine.realize(0.0, y, STAGE.ACCELERATION)
 
     return run
 

@@ -28,7 +28,7 @@ from osimlite.robot.drivers import coordinate_drivers
 from osimlite.robot.principal_axes import principal_axes
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import ITEM, MODEL
 from osimlite.simulation.system import System
 from osimlite.translate.mjcf.draft import Version
 from osimlite.translate.mjcf.driven import STATES
@@ -325,8 +325,8 @@ class Driver:
         controls = self.system.forces.controls
         none, one = (controls.driven(dict.fromkeys(controls.names, Constant(value))) for value in (0.0, 1.0))
         self.system.drive(none)
-        place = self.system.structure[layout.CONTROLS]
-        first = self.system.structure[place + layout.NUMBERS] if place else 0
+        place = self.system.structure[MODEL.CONTROLS]
+        first = self.system.structure[place + ITEM.NUMBERS] if place else 0
         self._controls = first + np.flatnonzero(np.array(none.record()[1]) != np.array(one.record()[1]))
         names = [self.model.actuator(k).name for k in range(self.model.nu)]
         self._states = names.index(STATES) if STATES in names else -1

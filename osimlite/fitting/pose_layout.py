@@ -10,9 +10,9 @@ from osimlite.multibody.constraints import Constraint, Coupler
 from osimlite.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
 from osimlite.records import dataclass
 from osimlite.simulation.elements.items import Places
-from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels import pose_record as fit
 from osimlite.simulation.kernels.functions import function_table
+from osimlite.simulation.kernels.layout import CONSTRAINED, LINK, MODEL, MOTION, OPERATION
 from osimlite.simulation.kernels.least_squares import factor_room
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.kernels.pose_fit import POSES
@@ -96,9 +96,9 @@ class FitLayout:
         couplers: Sequence[Coupler],
     ) -> None:
         s, size = system.structure, len(system.order)
-        links, equations = int(s[at.LINKS]), 0
-        if s[at.CONSTRAINED]:
-            equations = int(s[s[at.CONSTRAINED] + at.POSITIONS])
+        links, equations = int(s[MODEL.LINKS]), 0
+        if s[MODEL.CONSTRAINED]:
+            equations = int(s[s[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS])
         ints, numbers = [0] * fit.FIT_HEAD, list[float]()
         self._listed(ints, fit.MARKERS, fit.MARKER_AT, list(self._markers(places, markers, numbers)))
         self._listed(ints, fit.SENSORS, fit.SENSOR_AT, list(self._sensors(places, sensors, numbers)))
@@ -171,16 +171,16 @@ class FitLayout:
         """The axes of each link, in the order in which they carry one another."""
         first, axes, balls = [0], list[tuple[int, int]](), list[int]()
         for link in range(links):
-            record = s[s[at.LINK_AT] + at.LINK_INTS * link :]
-            for operation in range(record[at.FIRST_OPERATION], record[at.END_OPERATION]):
-                j = s[s[at.OPERATION_AT] + at.OPERATION_INTS * operation :]
+            record = s[s[MODEL.LINK_AT] + LINK.SIZE * link :]
+            for operation in range(record[LINK.FIRST_OPERATION], record[LINK.END_OPERATION]):
+                j = s[s[MODEL.OPERATION_AT] + OPERATION.SIZE * operation :]
                 parts = [-1]
-                if j[at.MOTION] in (at.BALL, at.BALL_BACK):
-                    balls.append(int(j[at.ARGUMENTS]))
+                if j[OPERATION.MOTION] in (MOTION.BALL, MOTION.BALL_BACK):
+                    balls.append(int(j[OPERATION.ARGUMENTS]))
                     parts = [0, 1, 2]
-                    if numbers[j[at.EXTRA] : j[at.EXTRA] + 3].any():
+                    if numbers[j[OPERATION.EXTRA] : j[OPERATION.EXTRA] + 3].any():
                         parts = [3, 4, 5, *parts]
-                    if j[at.MOTION] == at.BALL_BACK:
+                    if j[OPERATION.MOTION] == MOTION.BALL_BACK:
                         parts.reverse()
                 axes += [(operation, part) for part in parts]
             first.append(len(axes))

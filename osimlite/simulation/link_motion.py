@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from osimlite.multibody.parts import GROUND
 from osimlite.records import dataclass
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import LINK_WORK
 
 if TYPE_CHECKING:
     from osimlite.simulation.system import System
@@ -27,10 +27,13 @@ Moments = Sequence[tuple[float, Sequence[float]]]
 
 def moving(links: Floats, points: Floats) -> Floats:
     """Places (m) and velocities (m/s) in ground (..., 6) of points (..., 3) of links, as the kernels know these."""
-    origin, turning = links[..., layout.ORIGIN : layout.ORIGIN + 3], links[..., layout.VELOCITY : layout.VELOCITY + 3]
+    origin, turning = (
+        links[..., LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3],
+        links[..., LINK_WORK.VELOCITY : LINK_WORK.VELOCITY + 3],
+    )
     rotations = links[..., :9].reshape(*links.shape[:-1], 3, 3)
-    arms = links[..., layout.POSITION : layout.POSITION + 3] - origin + (rotations @ points[..., None])[..., 0]
-    velocities = links[..., layout.VELOCITY + 3 : layout.VELOCITY + 6] + np.cross(turning, arms)
+    arms = links[..., LINK_WORK.POSITION : LINK_WORK.POSITION + 3] - origin + (rotations @ points[..., None])[..., 0]
+    velocities = links[..., LINK_WORK.VELOCITY + 3 : LINK_WORK.VELOCITY + 6] + np.cross(turning, arms)
     return np.concatenate([arms + origin, velocities], axis=-1)
 
 
@@ -80,14 +83,14 @@ class LinkMotion:
             count = len(self.links)
             return np.tile(frame[:3, :3], (count, 1, 1)), np.tile(frame[:3, 3], (count, 1))
         rotation = link[:, :9].reshape(-1, 3, 3)
-        return rotation @ frame[:3, :3], link[:, layout.POSITION : layout.POSITION + 3] + rotation @ frame[:3, 3]
+        return rotation @ frame[:3, :3], link[:, LINK_WORK.POSITION : LINK_WORK.POSITION + 3] + rotation @ frame[:3, 3]
 
     def turning(self, body: int) -> tuple[Floats, Floats]:
         """Angular velocity (rad/s) and acceleration (rad/s²) of a body, (t, 3) each."""
         link, _ = self._own(body)
         if link is None:
             return np.zeros((len(self.links), 3)), np.zeros((len(self.links), 3))
-        w, alpha = (link[:, first : first + 3] for first in (layout.VELOCITY, layout.ACCELERATION))
+        w, alpha = (link[:, first : first + 3] for first in (LINK_WORK.VELOCITY, LINK_WORK.ACCELERATION))
         return w, alpha
 
     def point(self, body: int, location: Floats) -> tuple[Floats, Floats, Floats]:
@@ -100,8 +103,8 @@ class LinkMotion:
         place, velocity = np.split(moving(link, point), 2, axis=-1)
         w, alpha = self.turning(body)
         # The kernels accelerate everything upwards in place of gravity, about an origin that stays.
-        free = link[:, layout.ACCELERATION + 3 : layout.ACCELERATION + 6] + self.system.mechanism.gravity
-        arm = place - link[:, layout.ORIGIN : layout.ORIGIN + 3]
+        free = link[:, LINK_WORK.ACCELERATION + 3 : LINK_WORK.ACCELERATION + 6] + self.system.mechanism.gravity
+        arm = place - link[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
         return place, velocity, free + np.cross(alpha, arm) + np.cross(w, velocity)
 
     def _own(self, body: int) -> tuple[Floats | None, Floats]:

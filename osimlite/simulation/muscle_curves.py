@@ -23,7 +23,7 @@ from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.elements.kind import DeclaredForce
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import OUTCOME, STAGE
 from osimlite.simulation.paths import Paths
 from osimlite.simulation.system import System
 from osimlite.simulation.tabular import Tabular
@@ -208,7 +208,7 @@ class _Muscle(NamedTuple):
                 y[place] = self.activation
         try:
             y = system.equilibrated(0.0, y)
-            is_settled = system.realize(0.0, y, layout.FORCE_STAGE) == layout.OK
+            is_settled = system.realize(0.0, y, STAGE.FORCE) == OUTCOME.OK
         except SimulationError:
             is_settled = False
         known = {name: system.recorded(element.path, place) for name, place in element.kind.recorded.items()}

@@ -15,7 +15,7 @@ from osimlite.records import dataclass, replace
 from osimlite.simulation.elements.geometries.path import Path as Along
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.elements.items import Item, Places, Silent
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import OUTCOME, STAGE
 from osimlite.simulation.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SURFACE
 from osimlite.simulation.kernels.wrapping import SURFACE_LENGTH
 from osimlite.simulation.states import StateVariable
@@ -89,7 +89,7 @@ class PathSystem(System):
         pull, parts = self.program.code.entry("pull_each"), (self.numbers, self._w, self._y, self._f)
         with self._computing():
             status = self._run(pull, self.program.ints, *parts, len(poses), states, forces)
-        if status != layout.OK:
+        if status != OUTCOME.OK:
             raise self.refusal(status, 0.0, self._y.tolist())
         result = np.zeros((*forces.shape[:2], poses.shape[1]))
         result[:, :, self.order] = forces
@@ -200,8 +200,8 @@ class PathSystem(System):
     def _evaluated(self, q: Array, u: Array) -> None:
         y = self.state.pack(q.tolist(), u.tolist())
         with self._computing():
-            status = self.realize(0.0, y, layout.FORCE_STAGE)
-        if status != layout.OK:
+            status = self.realize(0.0, y, STAGE.FORCE)
+        if status != OUTCOME.OK:
             raise self.refusal(status, 0.0, y)
 
     @staticmethod

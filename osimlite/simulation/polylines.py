@@ -12,7 +12,7 @@ from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.elements.items import Item, Placement, Places
 from osimlite.simulation.engines.linking import Code, best
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import ITEM, LINK_WORK, MODEL
 from osimlite.simulation.kernels.pointers import Ints
 
 
@@ -61,9 +61,9 @@ class Polylines:
         bodies, freedoms = len(mechanism.bodies), len(mechanism.coordinates)
         places = Places(mechanism, {k: k for k in range(freedoms)}, [Placement(k, np.eye(4)) for k in range(bodies)])
         self.laws, self.items, self.traces = [""], list[int](), list[int]()
-        self.room, self.work = 0, layout.LINK_WORK * bodies
-        ints, numbers = [0] * layout.LAWS, list[float]()
-        ints[layout.FREEDOMS] = freedoms
+        self.room, self.work = 0, LINK_WORK.SIZE * bodies
+        ints, numbers = [0] * MODEL.LAWS, list[float]()
+        ints[MODEL.DOFS] = freedoms
         self._calls: list[int] = []
         for route in routes:
             place = len(ints)
@@ -79,7 +79,7 @@ class Polylines:
             self.room = max(self.room, route.corners)
         self.structure, self.numbers = np.array(ints, dtype=np.int64), np.array(numbers)
         self._w, self._y, self._f = np.zeros(self.work), np.zeros(2 * freedoms), np.zeros(3 * self.room)
-        self._poses = self._w[: layout.LINK_WORK * bodies].reshape(bodies, layout.LINK_WORK)
+        self._poses = self._w[: LINK_WORK.SIZE * bodies].reshape(bodies, LINK_WORK.SIZE)
 
     def _law(self, name: str, place: int | None = None) -> int:
         """Number of a law, which may be called from a place in the structure."""
@@ -109,13 +109,13 @@ class Polylines:
             origins: of the bodies in ground, (b, 3), m.
         """
         code, ints = self._linked
-        self._poses[:, layout.ROTATION : layout.ROTATION + 9] = rotations.reshape(-1, 9)
-        self._poses[:, layout.POSITION : layout.POSITION + 3] = origins
+        self._poses[:, LINK_WORK.ROTATION : LINK_WORK.ROTATION + 9] = rotations.reshape(-1, 9)
+        self._poses[:, LINK_WORK.POSITION : LINK_WORK.POSITION + 3] = origins
         self._y[: len(q)] = q
         given = ints, self.numbers, self._w, self._y, self._f
         result = []
         for item, trace in zip(self.items, self.traces, strict=True):
-            code.entry(self.laws[self.structure[item + layout.LAW]])(*given, item)
+            code.entry(self.laws[self.structure[item + ITEM.LAW]])(*given, item)
             count = code.entry(self.laws[trace])(*given, item)
             result.append(self._f[: 3 * count].reshape(-1, 3).copy())
         return result

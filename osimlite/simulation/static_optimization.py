@@ -35,8 +35,8 @@ from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.engines.linking import best
 from osimlite.simulation.files.storage import StoTable
-from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.effort import effort_room
+from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.simulation.system import System
 from osimlite.text import listed
 
@@ -216,12 +216,14 @@ class StaticOptimization:
         if not self.mechanism.constraints:
             return udot, ways
         system = System(self.mechanism, Forces(()))
-        order, head = list(system.order), int(system.structure[layout.CONSTRAINED])
-        count = int(system.structure[head + layout.EQUATIONS])
-        rows, drifts = (int(system.structure[head + place]) for place in (layout.WORK_ROWS, layout.WORK_DRIFTS))
+        order, head = list(system.order), int(system.structure[MODEL.CONSTRAINED])
+        count = int(system.structure[head + CONSTRAINED.EQUATIONS])
+        rows, drifts = (
+            int(system.structure[head + place]) for place in (CONSTRAINED.WORK_ROWS, CONSTRAINED.WORK_DRIFTS)
+        )
         moments = np.column_stack([times, system.state.rows(values, speeds)])
         places = [*range(rows, rows + count * len(order)), *range(drifts, drifts + count)]
-        looked = system.looked(moments, places, layout.ACCELERATION_STAGE)
+        looked = system.looked(moments, places, STAGE.ACCELERATION)
         equations = np.zeros((len(times), count, size))
         equations[:, :, order] = looked[:, : -count or None].reshape(len(times), count, -1)
         targets = looked[:, looked.shape[1] - count :]

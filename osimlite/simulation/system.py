@@ -25,6 +25,7 @@ from osimlite.simulation.elements.muscle import STRENGTH
 from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.engines.linking import Code, Program, best
 from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import CONTACT_WORK, ITEM, LINK_WORK, MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.link_motion import Moments, moving
@@ -85,10 +86,10 @@ class System:
         places = {owner: place for place, owner in packed.owners.items()}
         probes = (k for k, item in enumerate(forces.elements) if isinstance(item, DeclaredProbe))
         self._probe_places = [places.get(k, 0) for k in probes]
-        self._w = np.zeros(self.structure[layout.WORK_SIZE])
-        self._links = self._rows(layout.WORK_LINK, layout.LINKS, layout.LINK_WORK)
-        self._pairs = self._rows(layout.WORK_CONTACT, layout.CONTACTS, layout.CONTACT_WORK)
-        size = int(self.structure[layout.STATE_SIZE])
+        self._w = np.zeros(self.structure[MODEL.WORK_SIZE])
+        self._links = self._rows(MODEL.WORK_LINK, MODEL.LINKS, LINK_WORK.SIZE)
+        self._pairs = self._rows(MODEL.WORK_CONTACT, MODEL.CONTACTS, CONTACT_WORK.SIZE)
+        size = int(self.structure[MODEL.STATE_SIZE])
         self._y, self._f = np.zeros(size), np.zeros(size)
         self._take(mechanism, forces, packed.numbers)
 
@@ -115,12 +116,12 @@ class System:
 
     def drive(self, controls: Controls) -> None:
         """Have the actuators driven by other controls of the same names in all evaluations and motions from now on."""
-        place = self.structure[layout.CONTROLS]
+        place = self.structure[MODEL.CONTROLS]
         if controls is self._controls or not place:
             return
         own, numbers, kernel = controls.record()
-        self.structure = np.concatenate((self.structure[: place + layout.OWN], np.array(own, dtype=np.int64)))
-        first = self.structure[place + layout.NUMBERS]
+        self.structure = np.concatenate((self.structure[: place + ITEM.OWN], np.array(own, dtype=np.int64)))
+        first = self.structure[place + ITEM.NUMBERS]
         self.numbers = np.concatenate((self.numbers[:first], np.array(numbers, dtype=np.float64)))
         self.program.drive(self.structure, kernel)
         self._bind()
@@ -142,14 +143,14 @@ class System:
 
     def _run(self, function: Callable[..., int], *parts: Any) -> int:
         status = self.program.run(function, *parts)
-        if status == layout.FAILED:
+        if status == OUTCOME.FAILED:
             raise self.program.failures.pop()
         return status
 
     def _set(self, t: float, y: Sequence[float]) -> None:
         if len(y) != len(self._y):
             raise self.state.wrong_length(len(y))
-        self._w[layout.TIME] = t
+        self._w[WORK.TIME] = t
         self._y[:] = y
 
     def found(self) -> list[float]:
@@ -164,8 +165,8 @@ class System:
         Raises:
             SimulationError: the rates of coordinates are not defined there.
         """
-        status = self.realize(t, y, layout.FORCE_STAGE)
-        if status != layout.OK:
+        status = self.realize(t, y, STAGE.FORCE)
+        if status != OUTCOME.OK:
             raise self.refusal(status, t, y)
         self.note_loads(self._pairs[:, :3])
         return self.found()
@@ -184,7 +185,7 @@ class System:
         The wrench of each is what pushes it and all that it carries, gravity too, less what accelerates them: joints
         and constraints make up for it. Moments and errors are those of :meth:`looked`.
         """
-        first = int(self.structure[layout.WORK_LINK])
+        first = int(self.structure[MODEL.WORK_LINK])
         result = self.looked(moments, range(first, first + self._links.size), udot=udot)
         return result.reshape(-1, *self._links.shape)
 
@@ -199,7 +200,7 @@ class System:
         Raises:
             SimulationError: a force has no equilibrium, or the rates of coordinates are not defined there.
         """
-        if not self.structure[layout.EQUILIBRIA]:
+        if not self.structure[MODEL.EQUILIBRIA]:
             return list(y)
         code, ints, room = self.program.code, self.program.ints, (self._w, self._y, self._f)
         if self._equilibrate is None:
@@ -208,15 +209,15 @@ class System:
         self._set(t, y)
         run = self._equilibrate if numbers is None else partial(code.entry("equilibrate"), ints, numbers, *room)
         try:
-            status = self._run(run, layout.VELOCITY_STAGE)
+            status = self._run(run, STAGE.VELOCITY)
         except (ArithmeticError, ValueError) as failure:
             # Kernels as Python raise what machine code computes as no number.
             raise SimulationError(f"the equilibrium of the muscles cannot be computed: {failure}") from failure
-        if status == layout.UNSOLVED:
-            place = self.structure[layout.EQUILIBRIUM_AT] + layout.EQUILIBRIUM_INTS * int(self._f[0])
+        if status == OUTCOME.UNSOLVED:
+            place = self.structure[MODEL.EQUILIBRIUM_AT] + layout.EQUILIBRIUM_INTS * int(self._f[0])
             muscle = self._told(self.structure[place + 1])
             raise SimulationError(f"no equilibrium was found of {muscle}; start elsewhere, or without an equilibrium")
-        if status != layout.OK:
+        if status != OUTCOME.OK:
             raise self.refusal(status, t, y)
         return self._y.tolist()
 
@@ -238,27 +239,27 @@ class System:
         """The error for what the kernels say of a state."""
         if not np.isfinite(np.array(y)).all():
             return SimulationError("the state of the motion is not finite any more; ask for more accuracy")
-        if status == layout.UNSOLVED:
-            item = self.structure[self.structure[layout.ITEM_AT] + int(self._f[0])]
+        if status == OUTCOME.UNSOLVED:
+            item = self.structure[self.structure[MODEL.ITEM_AT] + int(self._f[0])]
             return NoSolution(f"there is no solution of the equations of {self._told(item)}")
-        if status == layout.SINGULAR_RATES:
+        if status == OUTCOME.SINGULAR_RATES:
             try:
                 self.mechanism.rate_matrix(self.state.values(y))
             except SimulationError as error:
                 return error
-        if status == layout.SINGULAR_MASS and self.structure[layout.CONSTRAINED]:
+        if status == OUTCOME.SINGULAR_MASS and self.structure[MODEL.CONSTRAINED]:
             try:
                 self.mechanism.acceleration(self.state.values(y), self.state.speeds(y), time=t)
             except SimulationError as error:
                 return error
-        elif status == layout.SINGULAR_MASS:
+        elif status == OUTCOME.SINGULAR_MASS:
             return massless(self.mechanism.coordinates[self.order[int(self._f[0])]].name)
         return SimulationError("the motion cannot be computed any further; ask for more accuracy")
 
     # ---------------------------------------------------------------------------------------------- reports
     def recorded(self, path: str, place: int) -> float:
         """A number in the record of an element, or of the controls, after an evaluation."""
-        start = self.structure[layout.WORK_CONTROL] if path == CONTROLS else self._records_at[path]
+        start = self.structure[MODEL.WORK_CONTROL] if path == CONTROLS else self._records_at[path]
         return float(self._w[start + place])
 
     def places_of(self, path: str, names: Iterable[str]) -> list[int]:
@@ -280,7 +281,7 @@ class System:
         return len(self._w)
 
     def looked(
-        self, moments: Floats, places: Sequence[int], stage: int = layout.FORCE_STAGE, udot: Floats | None = None
+        self, moments: Floats, places: Sequence[int], stage: int = STAGE.FORCE, udot: Floats | None = None
     ) -> Floats:
         """What is found at some moments, all in one call of the kernels.
 
@@ -302,8 +303,8 @@ class System:
         order = np.array([len(given), moving.shape[1], code.address(law), len(places), *places], dtype=np.int64)
         parts = self.program.ints, self.numbers, self._w, self._y, self._f, stage, given, order, result
         status = self._run(code.entry("look"), *parts)
-        if status != layout.OK:
-            raise self.refusal(status, float(self._w[layout.TIME]), self._y.tolist())
+        if status != OUTCOME.OK:
+            raise self.refusal(status, float(self._w[WORK.TIME]), self._y.tolist())
         return result
 
     def pushed(self, moments: Floats, udot: Floats, names: Sequence[str]) -> tuple[Floats, Floats, Floats]:
@@ -328,14 +329,14 @@ class System:
         for name in names:
             item, path, strength = items[name], -1, -1
             if self.knows(name, STRENGTH):
-                path = item - int(self.structure[item + layout.OWN + self._kind_at(name).text.heads])
+                path = item - int(self.structure[item + ITEM.OWN + self._kind_at(name).text.heads])
                 (strength,) = self.places_of(name, (STRENGTH,))
             order += item, controls[name], path, strength
         given, result = np.hstack([moments, udot]), np.empty((len(moments), size + len(names) * (size + 1)))
         parts = self.program.ints, self.numbers, self._w, self._y, self._f, code.address("inverse")
         status = self._run(code.entry("push_each"), *parts, given, np.array(order, dtype=np.int64), result)
-        if status != layout.OK:
-            raise self.refusal(status, float(self._w[layout.TIME]), self._y.tolist())
+        if status != OUTCOME.OK:
+            raise self.refusal(status, float(self._w[WORK.TIME]), self._y.tolist())
         each = result[:, size:].reshape(len(moments), len(names), size + 1)
         return result[:, :size], each[:, :, :size], each[:, :, size]
 
@@ -353,14 +354,14 @@ class System:
                 result.append(list(probe.kind.measure(probe, self, t, y)))
                 continue
             self.program.code.entry(probe.kind.name)(self.program.ints, self.numbers, self._w, self._y, self._f, place)
-            first = self.structure[place + layout.RECORD]
+            first = self.structure[place + ITEM.RECORD]
             result.append(self._w[first : first + len(probe.reading.labels)].tolist())
         return result
 
     @property
     def places_of_controls(self) -> range:
         """Where the work vector has the controls of all actuators, in the order of `Controls.names`."""
-        first = int(self.structure[layout.WORK_CONTROL])
+        first = int(self.structure[MODEL.WORK_CONTROL])
         return range(first, first + len(self._controls.names))
 
     def controls(self) -> list[float]:
@@ -394,7 +395,11 @@ class System:
         """Kinetic energy and potential energy of gravity of all links, after an evaluation."""
         w, inertia = self._links, self.inertia
         motion = moving(w, inertia[:, 1:4])
-        rotations, turning, v = w[:, :9].reshape(-1, 3, 3), w[:, layout.VELOCITY : layout.VELOCITY + 3], motion[:, 3:]
+        rotations, turning, v = (
+            w[:, :9].reshape(-1, 3, 3),
+            w[:, LINK_WORK.VELOCITY : LINK_WORK.VELOCITY + 3],
+            motion[:, 3:],
+        )
         own = (turning[:, None, :] @ rotations)[:, 0]
         moments = inertia[:, [4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(-1, 3, 3)
         spin = np.sum(own * (moments @ own[:, :, None])[:, :, 0])
@@ -420,10 +425,10 @@ class System:
 
     def links_of(self, moments: Floats, links: Sequence[int] | None = None) -> Floats:
         """What the kernels find of the motion of l links, or of all (k, l, n), at times (s) with states (k, 1 + y)."""
-        first, (count, size) = int(self.structure[layout.WORK_LINK]), self._links.shape
+        first, (count, size) = int(self.structure[MODEL.WORK_LINK]), self._links.shape
         chosen = range(count) if links is None else links
         places = [first + size * link + number for link in chosen for number in range(size)]
-        return self.looked(moments, places, layout.VELOCITY_STAGE).reshape(len(moments), len(chosen), size)
+        return self.looked(moments, places, STAGE.VELOCITY).reshape(len(moments), len(chosen), size)
 
     def _records(self) -> Iterator[tuple[ForceElement, list[list[float]]]]:
         """Each element with the records of its items, after an evaluation."""
@@ -437,7 +442,7 @@ class System:
         if link == GROUND:
             return x, y, z
         here = self._links[link]
-        place = here[layout.POSITION : layout.POSITION + 3] + here[:9].reshape(3, 3) @ frame[:3, 3]
+        place = here[LINK_WORK.POSITION : LINK_WORK.POSITION + 3] + here[:9].reshape(3, 3) @ frame[:3, 3]
         x, y, z = place.tolist()
         return x, y, z
 

@@ -8,7 +8,7 @@ from osimlite.multibody.parts import GROUND
 from osimlite.multibody.spatial import Array
 from osimlite.schema.joints import Joint
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import LINK_WORK
 from osimlite.simulation.link_motion import LinkMotion
 from osimlite.simulation.system import System
 from osimlite.tools.constraint_forces import ConstraintForces
@@ -42,9 +42,9 @@ class JointWrenches:
             for body, wrench in zip(constraint.bodies, forces.on_bodies(constraint, multipliers), strict=True):
                 force, here = wrench[3:], forces.state.origins[body]
                 while body != GROUND:
-                    arm = here - links[body, layout.ORIGIN : layout.ORIGIN + 3]
+                    arm = here - links[body, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
                     about = np.concatenate([wrench[:3] + np.cross(arm, force), force])
-                    links[body, layout.WRENCH : layout.WRENCH + 6] += about
+                    links[body, LINK_WORK.WRENCH : LINK_WORK.WRENCH + 6] += about
                     body = self.mechanism.bodies[body].parent
 
     def of(self, joint: Joint, side: str) -> tuple[Array, Array, Array]:
@@ -54,8 +54,8 @@ class JointWrenches:
         mobilizer = body.mobilizer
         # The body that the joint carries in the tree gets what is missing there, the other one the opposite.
         is_outer = (side == "child") != mobilizer.reversed
-        wrench = (-1.0 if is_outer else 1.0) * link[:, layout.WRENCH : layout.WRENCH + 6]
+        wrench = (-1.0 if is_outer else 1.0) * link[:, LINK_WORK.WRENCH : LINK_WORK.WRENCH + 6]
         frame = mobilizer.child_frame if side == "child" else mobilizer.parent_frame
         _, place = self.moved.placed(outer if is_outer else body.parent, frame)
-        arm = place - link[:, layout.ORIGIN : layout.ORIGIN + 3]
+        arm = place - link[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
         return wrench[:, 3:], wrench[:, :3] - np.cross(arm, wrench[:, 3:]), place

@@ -16,7 +16,7 @@ from osimlite.records import dataclass
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.files.storage import StoTable
-from osimlite.simulation.kernels.layout import ACCELERATION_STAGE, FORCE_STAGE
+from osimlite.simulation.kernels.layout import STAGE
 from osimlite.simulation.link_motion import LinkMotion
 from osimlite.simulation.probed import Moment
 from osimlite.simulation.run import Simulation
@@ -106,7 +106,7 @@ class Motion:
             columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = self.values[:, index], self.speeds[:, index]
         return {path: columns[path] for path in self.simulation.paths}
 
-    def looked(self, places: Sequence[int], stage: int = FORCE_STAGE) -> Array:
+    def looked(self, places: Sequence[int], stage: int = STAGE.FORCE) -> Array:
         """What the kernels find at every time (t, m); see :meth:`System.looked`."""
         return self.system.looked(self.table, places, stage)
 
@@ -121,7 +121,7 @@ class Motion:
         """Derivatives of the speeds (t, n), by all that acts on the model."""
         order, result = list(self.simulation.state.order), np.zeros_like(self.values)
         first = self.system.room + len(order)
-        result[:, order] = self.looked(range(first, first + len(order)), ACCELERATION_STAGE)
+        result[:, order] = self.looked(range(first, first + len(order)), STAGE.ACCELERATION)
         return result
 
     @cached_property

@@ -19,6 +19,7 @@ from typing import Any
 
 from osimlite.simulation.engines.sources import functions_within
 from osimlite.simulation.kernels import pointers
+from osimlite.simulation.kernels.layout import Record
 
 Kernel = Callable[..., Any]
 
@@ -166,6 +167,8 @@ class _Writer:
         match node:
             case ast.Constant(value=value):
                 return _number(value)
+            case ast.Attribute():
+                return self.constant(node)
             case ast.Name(id=name):
                 return _local(name) if name in self.own or name in self.given else self.constant(node)
             case ast.BinOp(left=left, op=ast.FloorDiv(), right=right):
@@ -207,7 +210,7 @@ class _Writer:
             raise self.unknown(node)
         return f"{name}({', '.join(given)})"
 
-    def constant(self, node: ast.Name) -> str:
+    def constant(self, node: ast.Name | ast.Attribute) -> str:
         value = self.value(node)
         if isinstance(value, tuple):
             return f"[{', '.join(map(_number, value))}]"
@@ -216,7 +219,10 @@ class _Writer:
         raise self.unknown(node)
 
     def value(self, node: ast.expr) -> Any:
-        """What a name means in the module of the function."""
+        """What a name means in the module of the function, or a field of a record there."""
+        if isinstance(node, ast.Attribute):
+            record = self.value(node.value)
+            return getattr(record, node.attr) if isinstance(record, Record) else None
         name = node.id if isinstance(node, ast.Name) else ""
         scope = self.function.__globals__
         return scope[name] if name in scope else getattr(builtins, name, None)

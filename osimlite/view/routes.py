@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import ITEM, LINK_WORK
 from osimlite.simulation.kernels.paths import pull_path
 from osimlite.simulation.kernels.table import law_function
 from osimlite.simulation.polylines import Polylines
@@ -28,11 +28,11 @@ def routes_data(paths: Polylines) -> dict[str, Any] | None:
         "room": paths.room,
         "work": paths.work,
         "layout": {
-            "link": layout.LINK_WORK,
-            "position": layout.POSITION,
-            "wrench": layout.WRENCH,
-            "law": layout.LAW,
-            "record": layout.RECORD,
+            "link": LINK_WORK.SIZE,
+            "position": LINK_WORK.POSITION,
+            "wrench": LINK_WORK.WRENCH,
+            "law": ITEM.LAW,
+            "record": ITEM.RECORD,
         },
     }
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.linking import PYTHON, Program
-from osimlite.simulation.kernels import layout, record
+from osimlite.simulation.kernels import record
+from osimlite.simulation.kernels.layout import MODEL, WORK
 from osimlite.simulation.kernels.pack import Packed
 from osimlite.simulation.kernels.table import LAW_NUMBERS
 
@@ -56,13 +57,13 @@ class Equations:
 
     def __init__(self, f, size, n, counted=None, names=None, code=PYTHON):
         def evaluate(s, x, w, y, derivative, stage):
-            derivative[:size] = f(float(w[layout.TIME]), y[:size].tolist())
+            derivative[:size] = f(float(w[WORK.TIME]), y[:size].tolist())
 
-        first = layout.WORK_HEAD
-        structure = np.zeros(layout.LAWS + len(LAW_NUMBERS), dtype=np.int64)
-        structure[[layout.FREEDOMS, layout.STATE_SIZE, layout.WORK_STATE]] = n, size, first
-        structure[layout.WORK_SIZE] = first + record.STATES * size
-        kernels = {layout.LAWS + LAW_NUMBERS["evaluate"]: evaluate}
+        first = WORK.SIZE
+        structure = np.zeros(MODEL.LAWS + len(LAW_NUMBERS), dtype=np.int64)
+        structure[[MODEL.DOFS, MODEL.STATE_SIZE, MODEL.WORK_STATE]] = n, size, first
+        structure[MODEL.WORK_SIZE] = first + record.STATES * size
+        kernels = {MODEL.LAWS + LAW_NUMBERS["evaluate"]: evaluate}
         packed = Packed(structure, np.zeros(1), (), kernels, {}, {}, {}, (), [], [])
         self.program = Program(packed, code, ("run_several", "merson"))
         self.structure, self.numbers, self.order = structure, packed.numbers, (0,) * n

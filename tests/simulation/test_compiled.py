@@ -41,7 +41,7 @@ pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import OUTCOME, STAGE
 from osimlite.simulation.system import System
 
 NO_BULLET = "needs pybullet (extra 'bullet')"
@@ -309,7 +309,7 @@ def test_kernels_are_what_they_mean_in_python(fast, fixtures):
         python = System(engine.mechanism, engine.forces, code=PYTHON)
         q, u = state_of(engine.mechanism, 3)
         y = engine.state.pack(0.2 * q, u)
-        assert python.realize(0.0, y, layout.ACCELERATION_STAGE) == layout.OK
+        assert python.realize(0.0, y, STAGE.ACCELERATION) == OUTCOME.OK
         assert python.found() == engine.derivative(0.0, y)
 
 

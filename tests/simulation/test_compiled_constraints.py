@@ -27,8 +27,8 @@ pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON
-from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels import least_squares as ls
+from osimlite.simulation.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.kernels.table import law_function
 from osimlite.simulation.many import ENDINGS, Watch, run_many
 from osimlite.simulation.system import System
@@ -168,12 +168,12 @@ def test_kernels_are_what_they_mean_in_python(make: Any):
         y = np.array(simulation.initial_state({}, {}))
     y += np.random.default_rng(1).uniform(-0.02, 0.02, len(y))
     python = System(engine.mechanism, engine.forces, code=PYTHON)
-    assert python.realize(0.0, y.tolist(), layout.ACCELERATION_STAGE) == layout.OK
+    assert python.realize(0.0, y.tolist(), STAGE.ACCELERATION) == OUTCOME.OK
     assert python.found() == engine.derivative(0.0, y)
     ends = run_many(engine, [y], 1e-30, accuracy=1e-8)
-    room, result = np.zeros(engine.structure[layout.WORK_SIZE]), np.zeros(len(y))
-    room[layout.SCRATCH : layout.SCRATCH + 2] = 1e-9, np.inf
-    assert law_function("project")(python.program.ints, engine.numbers, room, y, result, 0) == layout.OK
+    room, result = np.zeros(engine.structure[MODEL.WORK_SIZE]), np.zeros(len(y))
+    room[WORK.SCRATCH : WORK.SCRATCH + 2] = 1e-9, np.inf
+    assert law_function("project")(python.program.ints, engine.numbers, room, y, result, 0) == OUTCOME.OK
     assert y[: len(y) // 2].tolist() == ends.states[0][: len(y) // 2].tolist()
 
 

@@ -28,7 +28,7 @@ from osimlite.simulation.elements.geometries.load import Load
 from osimlite.simulation.engines.bullet.engine import BulletEngine
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import OUTCOME, STAGE
 from osimlite.simulation.system import System
 from tests.simulation.force_cases import FORCES, chain, contact, floor, stone, with_force
 
@@ -81,7 +81,7 @@ def test_force(name):
     python = System(mechanism, ours.forces, code=PYTHON)
     for t, q, u in states(mechanism, 2):
         y = ours.state.pack(q, u)
-        assert python.realize(t, y, layout.ACCELERATION_STAGE) == layout.OK
+        assert python.realize(t, y, STAGE.ACCELERATION) == OUTCOME.OK
         assert_close(python.found(), ours.derivative(t, y), 1e-13)
         assert_close(python.force_records(t, y), ours.force_records(t, y), 1e-13)
 

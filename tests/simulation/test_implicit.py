@@ -16,8 +16,8 @@ from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.linking import PYTHON
-from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.condensation import condensation_room, condense, correct, linearise
+from osimlite.simulation.kernels.layout import MODEL, OUTCOME, STAGE
 from osimlite.simulation.many import run_many
 from osimlite.simulation.system import System
 from tests.simulation.elements.muscle_rows import hung, muscle
@@ -55,10 +55,10 @@ def test_condensed_equations_are_those_of_all_states(case):
         y = np.array(simulation.initial_state({}, {"x": 0.1}, equilibrate=True))
     s = system.structure
     system.program.link_responses("bdf")
-    room, f, c = np.zeros(condensation_room(1, int(s[layout.RESPONSES]))), np.zeros(len(y)), 2e-3
+    room, f, c = np.zeros(condensation_room(1, int(s[MODEL.RESPONSES]))), np.zeros(len(y)), 2e-3
     rates = partial(rates_at, system)
     jacobian = np.column_stack([(rates(y + h) - rates(y - h)) / 2e-6 for h in 1e-6 * np.eye(len(y))])
-    assert linearise(system.program.ints, system.numbers, system._w, y, f, room) == layout.OK
+    assert linearise(system.program.ints, system.numbers, system._w, y, f, room) == OUTCOME.OK
     assert condense(system.program.ints, c, room)
     right = np.random.default_rng(1).uniform(-1.0, 1.0, len(y))
     result = right.copy()
@@ -67,7 +67,7 @@ def test_condensed_equations_are_those_of_all_states(case):
 
 
 def rates_at(system: System, y: Any) -> Any:
-    assert system.realize(0.0, y, layout.ACCELERATION_STAGE) == layout.OK
+    assert system.realize(0.0, y, STAGE.ACCELERATION) == OUTCOME.OK
     return np.array(system.found())
 
 

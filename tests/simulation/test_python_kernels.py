@@ -9,7 +9,7 @@ import osimlite
 from osimlite.multibody import build_mechanism
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import MODEL
 from tests.simulation.checked import Checked, bounded
 from tests.simulation.force_cases import FORCES, with_force
 from tests.simulation.test_compiled_forces import states
@@ -27,7 +27,7 @@ def compare(model: osimlite.Model, monkeypatch: pytest.MonkeyPatch, count: int =
     plain = CompiledEngine(mechanism, forces)
     assert plain.program.code is not compiled.program.code
     for t, q, u in states(mechanism, count):
-        if compiled.structure[layout.CONSTRAINED]:
+        if compiled.structure[MODEL.CONSTRAINED]:
             q = mechanism.assemble(q).tolist()
         y = compiled.state.pack(q, u)
         ours, theirs = plain.derivative(t, y), compiled.derivative(t, y)

@@ -12,7 +12,7 @@ import pytest
 from osimlite.multibody.spatial import inverse, offset, transform
 from osimlite.simulation.engines.linking import COMPILED
 from osimlite.simulation.kernels import wrapping
-from osimlite.simulation.kernels.layout import OWN
+from osimlite.simulation.kernels.layout import ITEM
 from osimlite.simulation.kernels.wrap_cylinder import settled
 from tests.conftest import ROOT
 from tests.simulation.checked import Checked
@@ -35,7 +35,7 @@ def bent(law, p, first, second):
     """What a law says of a piece of a path."""
     e = np.full(wrapping.ENDS, 7.0)
     e[wrapping.FIRST_END : wrapping.FIRST_TANGENT] = *first, *second
-    item, state = np.zeros(OWN, dtype=np.int64), np.zeros(1)
+    item, state = np.zeros(ITEM.OWN, dtype=np.int64), np.zeros(1)
     says = law(item, p, e, state, state, 0)
     return says, e[wrapping.FIRST_TANGENT : wrapping.SURFACE_LENGTH].reshape(2, 3), e[wrapping.SURFACE_LENGTH]
 

@@ -18,7 +18,7 @@ from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.tree import Use
 from osimlite.simulation.elements.gather import ElementBuilder, Triple, kind_of, triple
 from osimlite.simulation.elements.items import Item, Places
-from osimlite.simulation.kernels.layout import DEPTH_OF, RADIUS_OF
+from osimlite.simulation.kernels.layout import CONTACT_WORK
 from osimlite.simulation.states import StateVariable
 
 if TYPE_CHECKING:
@@ -144,7 +144,7 @@ class PairContact:
         """Total force on the body of each surface, and its torque about the body's origin, in ground."""
         loads: dict[int, list[float]] = {}
         for pair, record in zip(self.pairs, records, strict=False):
-            if not record[DEPTH_OF] > 0.0:
+            if not record[CONTACT_WORK.DEPTH] > 0.0:
                 continue
             force, torque = vector(record, 0), vector(self.torque(records, pair), 0)
             for surface, sign in ((self.surfaces[pair.first], -1.0), (self.surfaces[pair.second], 1.0)):
@@ -164,9 +164,9 @@ class PairContact:
     def energy(self, records: Sequence[Sequence[float]]) -> float:
         """Potential energy, J."""
         return sum(
-            contact_energy(record[DEPTH_OF], record[RADIUS_OF], pair.effective[0])
+            contact_energy(record[CONTACT_WORK.DEPTH], record[CONTACT_WORK.RADIUS], pair.effective[0])
             for pair, record in zip(self.pairs, records, strict=False)
-            if record[DEPTH_OF] > 0.0
+            if record[CONTACT_WORK.DEPTH] > 0.0
         )
 
 

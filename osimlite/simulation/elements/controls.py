@@ -16,8 +16,8 @@ from osimlite.schema.base import Unknown
 from osimlite.schema.controller_types import ControlSetController, TrackingController
 from osimlite.schema.controllers import Controller
 from osimlite.simulation.elements.integral import value_of
-from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.functions import table_of_one
+from osimlite.simulation.kernels.layout import ITEM, WORK
 
 if TYPE_CHECKING:
     from osimlite.simulation.elements.gather import ElementBuilder
@@ -58,7 +58,7 @@ class Controls:
         return [len(ends), *ends, *tables], numbers, kernel
 
     def _computed(self, s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> None:
-        first, time = s[item + layout.RECORD], w[layout.TIME]
+        first, time = s[item + ITEM.RECORD], w[WORK.TIME]
         for number, functions in enumerate(self.functions):
             w[first + number] = sum(value_of(function, time) for function in functions)
 

@@ -31,7 +31,7 @@ from osimlite.simulation.elements.contact import (
 from osimlite.simulation.elements.gather import ElementBuilder, triple
 from osimlite.simulation.elements.items import Item, Placement, Places
 from osimlite.simulation.elements.triangle_mesh import TriangleMesh
-from osimlite.simulation.kernels.layout import LINK_WORK, RECORD, WORK_LINK
+from osimlite.simulation.kernels.layout import ITEM, LINK_WORK, MODEL
 from osimlite.simulation.kernels.meshes import MESH_WORK, load_mesh
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.kernels.points import angular_velocity, station, velocity
@@ -214,7 +214,7 @@ class _Meshes:
 
     def __call__(self, s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> None:
         """Compute and apply the contact."""
-        w[s[item + RECORD] :][:MESH_WORK] = 0.0
+        w[s[item + ITEM.RECORD] :][:MESH_WORK] = 0.0
         one, two = self._pose(s, w, self.one), self._pose(s, w, self.two)
         first, second = self.springs.one, self.springs.two
         about, other = two.points(np.array(second.center)), one.points(np.array(first.center))
@@ -231,6 +231,6 @@ class _Meshes:
         link, frame = placement
         if link < 0:
             return Pose(frame[:3, :3], frame[:3, 3])
-        start = s[WORK_LINK] + LINK_WORK * link
+        start = s[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
         origin = np.array(station(s, w, link, triple(frame[:3, 3])))
         return Pose(w[start : start + 9].reshape(3, 3) @ frame[:3, :3], origin)

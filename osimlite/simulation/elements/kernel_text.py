@@ -8,8 +8,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from osimlite.records import dataclass
-from osimlite.simulation.kernels import layout, pointers
+from osimlite.simulation.kernels import pointers
 from osimlite.simulation.kernels.condensation import WIDTH
+from osimlite.simulation.kernels.layout import ITEM, MODEL, OUTCOME, WORK
 from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF, RESPONSE, RIGID
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 SOLVED = "solved"
 """The output that tells whether the law has a solution; without it, it always has one."""
 
-NAMES = "NUMBERS", "RECORD", "OWN", "FREEDOMS", "TIME", "SCRATCH", "WORK_CONTROL", "OK", "UNSOLVED"
+RECORDS = {record.__name__: record for record in (MODEL, ITEM, WORK, OUTCOME)}
 """What the code of kernels uses of the layout."""
 
 SMALL_CHANGE = 1e-7
@@ -51,7 +52,7 @@ class KernelText:
         kind = self.kind
         lines = [f"{', '.join((SOLVED, *kind.settled))} = law({', '.join(self._arguments)})"]
         lines += self._noted((*kind.geometry.inputs, *kind.settled))
-        lines += [f"if not {SOLVED}:", "    return UNSOLVED"]
+        lines += [f"if not {SOLVED}:", "    return OUTCOME.UNSOLVED"]
         for place, state in self._places.items():
             if state.name in kind.settled:
                 lines += [f"if i[{place}] >= 0:", f"    y[i[{place}]] = {state.name}"]
@@ -82,7 +83,7 @@ class KernelText:
             arguments[place] += f" + {SMALL_CHANGE}"
             results = ", ".join(f"{name}_{column + 1}" for name in outputs)
             lines.append(f"{results} = law({', '.join(arguments)})")
-        lines += [f"{force} = 1.0", *kind.geometry.after, "change = at(w, SCRATCH)"]
+        lines += [f"{force} = 1.0", *kind.geometry.after, "change = at(w, WORK.SCRATCH)"]
         for row, name in enumerate((force, *(state.rate for state in kind.states))):
             for column in range(WIDTH):
                 difference = f"({name}_{column + 1} - {name}_0) / {SMALL_CHANGE}" if column in changed else "0.0"
@@ -112,11 +113,11 @@ class KernelText:
             [
                 f'def {name}(s: "Ints", x: "Floats", w: "Floats", y: "Floats", f: "Floats", item: "int") -> "int":',
                 "i = at(s, item)",
-                "p, found = at(x, i[NUMBERS]), at(w, i[RECORD])",
-                f"g, gp, room = at(i, {layout.OWN + self.heads}), at(p, {self.size}), at(found, {recorded})",
+                "p, found = at(x, i[ITEM.NUMBERS]), at(w, i[ITEM.RECORD])",
+                f"g, gp, room = at(i, {ITEM.OWN + self.heads}), at(p, {self.size}), at(found, {recorded})",
                 *kind.geometry.before,
                 *lines,
-                "return OK\n",
+                "return OUTCOME.OK\n",
             ]
         )
         scope = {name: value for term in kind.terms for name, value in term.functions().items()}
@@ -131,7 +132,7 @@ class KernelText:
             lines.append(f"{results}law({', '.join(self._arguments)})")
         lines += self._noted(kind.recorded)
         if SOLVED in kind.outputs:
-            lines += [f"if not {SOLVED}:", "    return UNSOLVED"]
+            lines += [f"if not {SOLVED}:", "    return OUTCOME.UNSOLVED"]
         for place, state in self._places.items():
             lines += [f"if i[{place}] >= 0:", f"    f[i[{place}]] = {state.rate}"]
         return lines
@@ -143,14 +144,14 @@ class KernelText:
     @property
     def _places(self) -> dict[int, State]:
         """Each state, by the integer of an item that says where it is, -1 if it has none."""
-        first = layout.OWN + sum(term.heads for term in self.kind.terms)
+        first = ITEM.OWN + sum(term.heads for term in self.kind.terms)
         return {first + number: state for number, state in enumerate(self.kind.states)}
 
     @property
     def _arguments(self) -> list[str]:
         """What a law is called with."""
         kind = self.kind
-        places, number = layout.OWN, 0
+        places, number = ITEM.OWN, 0
         terms: list[str] = []
         for term in kind.terms:
             terms += term.arguments(places, number)
@@ -181,7 +182,7 @@ def written(name: str, module: str, source: str, **scope: Any) -> Callable[..., 
         source: its text.
         scope: what this uses, besides the layout.
     """
-    known = {**{name: getattr(layout, name) for name in NAMES}, "at": pointers.at, "__name__": module, **scope}
+    known = {**RECORDS, "at": pointers.at, "__name__": module, **scope}
     file = f"<kernel {name}>"
     exec(compile(source, file, "exec", dont_inherit=True), known)
     # Tracebacks and `inspect.getsource` show it as they show a file.

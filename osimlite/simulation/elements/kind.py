@@ -29,7 +29,7 @@ from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places, Response, Silent
 from osimlite.simulation.elements.kernel_text import SOLVED, KernelText
 from osimlite.simulation.elements.parameters import Control, Fields, Number, Parameter, ReflexControl, Tail
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import ITEM
 from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF, RESPONSE, RIGID
 from osimlite.simulation.states import StateVariable
 
@@ -183,9 +183,9 @@ class Kind:
         parts = self.geometry.parts(force.place, places)
         ints, numbers = self.geometry.pack(force.place, places)
         if parts:
-            ints = (layout.OWN + len(parts[-1].ints), *ints)
+            ints = (ITEM.OWN + len(parts[-1].ints), *ints)
         size = len(self.recorded) + self.geometry.room(force.place)
-        tail = Tail(layout.OWN + self.text.heads + len(ints), self.text.size + len(numbers), size)
+        tail = Tail(ITEM.OWN + self.text.heads + len(ints), self.text.size + len(numbers), size)
         heads: list[int] = []
         own: list[float] = []
         for term, value in zip(self.terms, force.values, strict=True):

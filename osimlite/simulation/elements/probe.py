@@ -25,12 +25,12 @@ from osimlite.simulation.elements.gather import ElementBuilder, module_of
 from osimlite.simulation.elements.items import CONTROLS, ForceElement, Item, Places, Silent
 from osimlite.simulation.elements.kernel_text import written
 from osimlite.simulation.elements.kind import DeclaredForce
-from osimlite.simulation.kernels import layout
 from osimlite.simulation.kernels.functions import table_of_one
+from osimlite.simulation.kernels.layout import ITEM
 from osimlite.simulation.states import StateVariable
 from osimlite.text import did_you_mean
 
-HEAD = layout.OWN + 5
+HEAD = ITEM.OWN + 5
 """Offset of the integers that tell what a probe reads, after those of its own."""
 
 INTEGRATE = "integrate"
@@ -108,9 +108,9 @@ class ProbeKind:
         lines = [
             f'def {self.name}(s: "Ints", x: "Floats", w: "Floats", y: "Floats", f: "Floats", item: "int") -> "int":',
             "i = at(s, item)",
-            "p, found = at(x, i[NUMBERS]), at(w, i[RECORD])",
-            "first, total = i[OWN + 1], p[0]",
-            "for k in range(i[OWN]):",
+            "p, found = at(x, i[ITEM.NUMBERS]), at(w, i[ITEM.RECORD])",
+            "first, total = i[ITEM.OWN + 1], p[0]",
+            "for k in range(i[ITEM.OWN]):",
             f"    a, b = at(i, {HEAD} + {count} * k), at(p, 1 + {size} * k)",
             f"    value = law({', '.join(given)})",
             "    total += value",
@@ -120,10 +120,10 @@ class ProbeKind:
             "    found[0] = total",
             "if first == 2:",
             "    found[1] = p[0]",
-            "for k in range(i[OWN + 2]):",
-            "    f[i[OWN + 3] + k] = found[k]",
+            "for k in range(i[ITEM.OWN + 2]):",
+            "    f[i[ITEM.OWN + 3] + k] = found[k]",
         ]
-        return "\n    ".join([*lines, "return OK"]) + "\n"
+        return "\n    ".join([*lines, "return OUTCOME.OK"]) + "\n"
 
 
 @dataclass(frozen=True)

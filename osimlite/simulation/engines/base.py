@@ -10,7 +10,7 @@ from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.integrators import MERSON
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.stepper import Observer, Stepper
 from osimlite.simulation.system import System
 
@@ -41,8 +41,8 @@ class KernelEngine(System):
     # ---------------------------------------------------------------------------------------- accelerations
     def derivative(self, t: float, y: Sequence[float]) -> list[float]:
         """(qdot, udot, zdot) at a state."""
-        status = self.realize(t, y, layout.ACCELERATION_STAGE)
-        if status != layout.OK:
+        status = self.realize(t, y, STAGE.ACCELERATION)
+        if status != OUTCOME.OK:
             raise self.refusal(status, t, y)
         self.note_loads(self._pairs[:, :3])
         return self.found()
@@ -74,18 +74,18 @@ class KernelEngine(System):
 
     def projected(self, t: float, y: Sequence[float], tolerance: float) -> list[float] | None:
         """The state (y,) nearest to one where the constraints hold to a tolerance; None if none is near."""
-        if not self.structure[layout.CONSTRAINED]:
+        if not self.structure[MODEL.CONSTRAINED]:
             return list(y)
         self._set(t, y)
-        self._w[layout.SCRATCH : layout.SCRATCH + 2] = tolerance, inf
+        self._w[WORK.SCRATCH : WORK.SCRATCH + 2] = tolerance, inf
         entry = self.program.code.entry("project")
         status = entry(self.program.ints, self.numbers, self._w, self._y, self._f, 0)
-        return self._y.tolist() if status == layout.OK else None
+        return self._y.tolist() if status == OUTCOME.OK else None
 
     def _rates(self, q: list[float], u: list[float]) -> list[float]:
         y = q + u + [0.0] * len(self.state.variables)
-        status = self.realize(0.0, y, layout.VELOCITY_STAGE)
-        if status != layout.OK:
+        status = self.realize(0.0, y, STAGE.VELOCITY)
+        if status != OUTCOME.OK:
             raise self.refusal(status, 0.0, y)
         return self.found()[: len(self.order)]
 

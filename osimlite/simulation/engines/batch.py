@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from osimlite.simulation import kernels
 from osimlite.simulation.integrators import INITIAL_STEP
-from osimlite.simulation.kernels import layout, record
+from osimlite.simulation.kernels import record
 from osimlite.simulation.kernels.condensation import condensation_room
+from osimlite.simulation.kernels.layout import MODEL
 from osimlite.simulation.kernels.method import ERRORS
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.kernels.table import LAW_MODULES
@@ -73,11 +74,11 @@ class Batch:
         self._settings = options.to, options.accuracy, *engine.counted, *options.step_bounds
         s, event, program = engine.structure, 3 + size * options.event_states, engine.program
         method = import_module(f"{kernels.__name__}.{LAW_MODULES[options.integrator]}")
-        self._method_at = int(s[layout.WORK_SIZE]) + 3 * (pairs + len(kinds))
+        self._method_at = int(s[MODEL.WORK_SIZE]) + 3 * (pairs + len(kinds))
         self._room = self._method_at + method.HEAD + method.STATES * size
         if method.IS_IMPLICIT:
             program.link_responses(options.integrator)
-            self._room += condensation_room(int(s[layout.FREEDOMS]), int(s[layout.RESPONSES]))
+            self._room += condensation_room(int(s[MODEL.DOFS]), int(s[MODEL.RESPONSES]))
         sizes = options.most_tries, len(self._times), options.most_events, event, len(kinds), most_logged
         address = program.code.address(options.integrator)
         self._sizes = np.array((*sizes, start_holds, address, self._method_at), dtype=np.int64)
@@ -100,7 +101,7 @@ class Batch:
         """Compute the runs from `first` up to `last`; other threads compute others in rooms of theirs."""
         vectors = self._vectors
         size = self.states.shape[1]
-        first_error = int(self._engine.structure[layout.WORK_STATE]) + ERRORS * size
+        first_error = int(self._engine.structure[MODEL.WORK_STATE]) + ERRORS * size
         self.errors = room[first_error : first_error + size]
         room[self._method_at :][: len(self._settings)] = self._settings
         program = self._engine.program

@@ -16,12 +16,13 @@ import dis
 from collections.abc import Iterator
 from functools import cache
 from inspect import signature
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import Any
 
 from osimlite._require import require
 from osimlite.simulation.engines.object_code import machine
 from osimlite.simulation.kernels import pointers
+from osimlite.simulation.kernels.layout import Record
 
 numba = require("numba", extra="sim", purpose="the compiled engine")
 
@@ -152,6 +153,14 @@ def _within(function: Any) -> Any:
     return numba.njit(_linked(function), no_cpython_wrapper=True, no_cfunc_wrapper=True, **LEAN)
 
 
+@cache
+def _as_module(record: Record) -> ModuleType:
+    """A record as what numba reads constants from."""
+    module = ModuleType(record.__name__)
+    vars(module).update(vars(record))
+    return module
+
+
 def _linked(function: Any) -> Any:
     """A function that calls the compiled ones of ours in their place."""
     scope = dict(function.__globals__)
@@ -159,6 +168,8 @@ def _linked(function: Any) -> Any:
         value = scope.get(called)
         if isinstance(value, FunctionType) and value.__module__.startswith("osimlite."):
             scope[called] = INSTRUCTIONS.get(value) or _within(value)
+        elif isinstance(value, Record):
+            scope[called] = _as_module(value)
     copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__, None)
     copy.__qualname__, copy.__module__ = function.__qualname__, function.__module__
     return copy

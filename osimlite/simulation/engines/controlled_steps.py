@@ -20,7 +20,8 @@ from osimlite.simulation.integrators import (
     shortest_step,
     weight,
 )
-from osimlite.simulation.kernels import layout, record
+from osimlite.simulation.kernels import record
+from osimlite.simulation.kernels.layout import MODEL
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.kernels.states import cubic
 from osimlite.simulation.many import BatchOptions
@@ -208,7 +209,7 @@ class ControlledSteps(Stepper):
             what = f"leaves the range of numbers in {self._name(index)}"
         elif off[index] > self._accuracy:
             what = f"misses the accuracy {off[index] / self._accuracy:.3g} times, most of all in {self._name(index)}"
-        elif self._engine.structure[layout.CONSTRAINED]:
+        elif self._engine.structure[MODEL.CONSTRAINED]:
             what = "ends too far from where the constraints hold"
         else:
             what = "has no end that can be computed"

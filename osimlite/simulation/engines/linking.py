@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from osimlite.simulation.interrupts import defer_sigint
-from osimlite.simulation.kernels import layout, pointers
+from osimlite.simulation.kernels import pointers
+from osimlite.simulation.kernels.layout import MODEL, OUTCOME
 from osimlite.simulation.kernels.pack import Packed
 from osimlite.simulation.kernels.pointers import Ints
 from osimlite.simulation.kernels.table import LAW_NUMBERS, law_function
@@ -194,14 +195,14 @@ class Program:
         self._kept: list[Any] = []
         code.make_ready(functions)
         for name in packed.laws:
-            self.ints[layout.LAWS + LAW_NUMBERS[name]] = code.address(name)
+            self.ints[MODEL.LAWS + LAW_NUMBERS[name]] = code.address(name)
         self._count = len(packed.numbers)
         for place, kernel in packed.kernels.items():
             self._link(place, kernel)
 
     def drive(self, structure: Ints, kernel: str | Callable[..., None]) -> None:
         """Take the record of the controls, behind which there is nothing, from another structure."""
-        place = int(structure[layout.CONTROLS])
+        place = int(structure[MODEL.CONTROLS])
         self.ints = np.concatenate((self.ints[:place], structure[place:]))
         if isinstance(kernel, str):
             self.code.make_ready((kernel,))
@@ -212,8 +213,8 @@ class Program:
         if isinstance(kernel, str):
             self.ints[place] = self.code.address(kernel)
             return
-        size = int(self.ints[layout.STATE_SIZE])
-        sizes = len(self.ints), self._count, int(self.ints[layout.WORK_SIZE]), size, size
+        size = int(self.ints[MODEL.STATE_SIZE])
+        sizes = len(self.ints), self._count, int(self.ints[MODEL.WORK_SIZE]), size, size
         self.ints[place], kept = self.code.callback(self._guarded(kernel), sizes)
         self._kept.append(kept)
 
@@ -248,8 +249,8 @@ class Program:
                 python(*parts)
             except Exception as error:
                 self.failures.append(error)
-                return layout.FAILED
-            return layout.OK
+                return OUTCOME.FAILED
+            return OUTCOME.OK
 
         return kernel
 

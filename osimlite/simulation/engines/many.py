@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from osimlite._cores import cores
 from osimlite.errors import OsimliteError
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.kernels import layout, record
+from osimlite.simulation.kernels import record
 from osimlite.simulation.kernels.contacts import RADIUS
+from osimlite.simulation.kernels.layout import ITEM, MODEL
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.many import BatchOptions
 from osimlite.simulation.runs import Runs, Watch
@@ -69,7 +70,7 @@ def contact_places(
     vectors, given = _rows(engine, numbers), engine.state.table(states)
     which = np.zeros(len(given), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
     places = np.zeros((len(given), len(engine.contacts), 9))
-    w, derivative = np.zeros(engine.structure[layout.WORK_SIZE]), np.zeros(engine.state.size)
+    w, derivative = np.zeros(engine.structure[MODEL.WORK_SIZE]), np.zeros(engine.state.size)
     arrays = vectors, w, vectors.shape[1], which, given, derivative, places
     engine.program.code.entry("contact_places")(engine.program.ints, *arrays, len(given))
     return places
@@ -78,8 +79,8 @@ def contact_places(
 def contact_radii(engine: CompiledEngine, numbers: ArrayLike | None = None) -> Floats:
     """Radii of the second surfaces (v, P)."""
     s = engine.structure
-    records = s[s[layout.CONTACT_AT] : s[layout.CONTACT_AT] + len(engine.contacts)]
-    return _rows(engine, numbers)[:, s[records + layout.NUMBERS] + RADIUS]
+    records = s[s[MODEL.CONTACT_AT] : s[MODEL.CONTACT_AT] + len(engine.contacts)]
+    return _rows(engine, numbers)[:, s[records + ITEM.NUMBERS] + RADIUS]
 
 
 def _rows(engine: CompiledEngine, numbers: ArrayLike | None) -> Floats:

@@ -22,7 +22,7 @@ from osimlite.simulation.elements.controls import Controls, ModelControls
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.elements.kind import kind_of_class
 from osimlite.simulation.elements.probe import DeclaredProbe, probe_elements
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import ITEM, MODEL
 from osimlite.simulation.kernels.pack import pack
 from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.many import Renewed
@@ -51,8 +51,8 @@ class NumbersOnly:
         self._places = Places(engine.mechanism, freedoms, engine.placements)
         self._items = {element.path: element.items(self._places) for element in engine.forces.elements}
         # The numbers of all items are the last ones before those of the controls, in their order.
-        controls = engine.structure[layout.CONTROLS]
-        end = engine.structure[controls + layout.NUMBERS] if controls > 0 else len(engine.numbers)
+        controls = engine.structure[MODEL.CONTROLS]
+        end = engine.structure[controls + ITEM.NUMBERS] if controls > 0 else len(engine.numbers)
         self._first, place = {}, end - sum(_length(items) for items in self._items.values())
         for path, items in self._items.items():
             self._first[path] = place
@@ -108,11 +108,11 @@ class NumbersOnly:
             numbers[place : place + _length(items)] = [x for item in items for x in item.numbers]
         if controls is not self._forces.controls:
             structure = self._engine.structure
-            place = structure[layout.CONTROLS]
+            place = structure[MODEL.CONTROLS]
             ints, own, _ = controls.record()
-            if structure[place + layout.OWN :].tolist() != ints:
+            if structure[place + ITEM.OWN :].tolist() != ints:
                 return None
-            numbers[structure[place + layout.NUMBERS] :] = own
+            numbers[structure[place + ITEM.NUMBERS] :] = own
         return numbers
 
     def _with_masses(self) -> Mechanism | None:

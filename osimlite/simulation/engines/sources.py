@@ -13,6 +13,8 @@ from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any
 
+from osimlite.simulation.kernels.layout import Record
+
 
 @cache
 def digest_of(function: Any) -> str:
@@ -62,6 +64,8 @@ def _is_ours(value: object) -> bool:
 
 def _constant(value: Any) -> Any:
     """What a value is in another process too: compiled code holds numbers, and knows the fields of classes."""
+    if isinstance(value, Record):
+        return value.__qualname__, {name: number for name, number in vars(value).items() if name.isupper()}
     if isinstance(value, type):
         return value.__qualname__, getattr(value, "_fields", ()), getattr(value, "__annotations__", {})
     if isinstance(value, int | float | str | tuple):

@@ -3,25 +3,9 @@
 from __future__ import annotations
 
 from osimlite.forces.vectors import ZERO, along, cross, minus, times, vector
-from osimlite.simulation.kernels.layout import (
-    AMOUNT,
-    ARGUMENT_COUNT,
-    ARGUMENTS,
-    AXIS,
-    CURVATURE,
-    FREEDOM,
-    FREEDOMS,
-    GRADIENT,
-    OK,
-    OPERATION_AT,
-    OPERATION_INTS,
-    OPERATION_WORK,
-    POINT,
-    RATE,
-    SCRATCH,
-    WORK_OPERATION,
-)
+from osimlite.simulation.kernels.layout import MODEL, OPERATION, OPERATION_WORK, OUTCOME, WORK
 from osimlite.simulation.kernels.motion import set_row
+from osimlite.simulation.kernels.parts import operation_ints, operation_work
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.states import copy
 
@@ -32,16 +16,20 @@ joint, and the operations that are the three turns, -1 for what does not move.""
 
 def place_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Nothing moves."""
-    kept, frame = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH)
+    kept, frame = operation_work(s, w, operation), at(w, WORK.SCRATCH)
     copy(12, frame, kept)
-    return OK
+    return OUTCOME.OK
 
 
 def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Velocity and own acceleration in SCRATCH; what turns the joint forwards stays in the operation."""
-    own = at(s, s[s[OPERATION_AT] + OPERATION_INTS * operation + ARGUMENTS])
-    kept, result, u = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH), at(y, s[FREEDOMS])
-    arm, total = minus(vector(kept, POINT), vector(result, 0)), ZERO
+    own = at(s, operation_ints(s, operation)[OPERATION.ARGUMENTS])
+    kept, result, u = (
+        operation_work(s, w, operation),
+        at(w, WORK.SCRATCH),
+        at(y, s[MODEL.DOFS]),
+    )
+    arm, total = minus(vector(kept, OPERATION_WORK.POINT), vector(result, 0)), ZERO
     for row in range(1, 3):
         last = own[TURNS + row]
         if last < 0:
@@ -59,28 +47,28 @@ def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
                     wrong += share(s, w, number, freedom) * u[freedom]
             if turn < row:
                 wrong -= rate(s, w, u, number)
-            drift = along(drift, wrong, vector(w, s[WORK_OPERATION] + OPERATION_WORK * number + AXIS))
-        axis = vector(w, s[WORK_OPERATION] + OPERATION_WORK * last + AXIS)
+            drift = along(drift, wrong, vector(operation_work(s, w, number), OPERATION_WORK.AXIS))
+        axis = vector(operation_work(s, w, last), OPERATION_WORK.AXIS)
         total = along(total, -rate(s, w, u, last), cross(axis, drift))
-    kept[AMOUNT], kept[RATE], kept[CURVATURE] = total
+    kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE], kept[OPERATION_WORK.CURVATURE] = total
     total = times(float(own[SIGN]), total)
     set_row(result, ZERO, ZERO)
     set_row(at(result, 6), cross(arm, total), total)
-    return OK
+    return OUTCOME.OK
 
 
 def rate(s: Ints, w: Floats, u: Floats, operation: int) -> float:
     """Of the amount of an operation."""
-    freedom = s[s[OPERATION_AT] + OPERATION_INTS * operation + FREEDOM]
-    return u[freedom] if freedom >= 0 else w[s[WORK_OPERATION] + OPERATION_WORK * operation + RATE]
+    freedom = operation_ints(s, operation)[OPERATION.DOF]
+    return u[freedom] if freedom >= 0 else operation_work(s, w, operation)[OPERATION_WORK.RATE]
 
 
 def share(s: Ints, w: Floats, operation: int, freedom: int) -> float:
     """Derivative of the amount of an operation by a degree of freedom."""
-    j, total = at(s, s[OPERATION_AT] + OPERATION_INTS * operation), 0.0
-    if j[FREEDOM] >= 0:
-        return 1.0 if j[FREEDOM] == freedom else 0.0
-    for k in range(j[ARGUMENT_COUNT]):
-        if s[j[ARGUMENTS] + k] == freedom:
-            total += w[j[GRADIENT] + k]
+    j, total = operation_ints(s, operation), 0.0
+    if j[OPERATION.DOF] >= 0:
+        return 1.0 if j[OPERATION.DOF] == freedom else 0.0
+    for k in range(j[OPERATION.ARGUMENT_COUNT]):
+        if s[j[OPERATION.ARGUMENTS] + k] == freedom:
+            total += w[j[OPERATION.GRADIENT] + k]
     return total

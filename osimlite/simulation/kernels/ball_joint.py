@@ -16,24 +16,9 @@ from osimlite.forces.vectors import (
     turned,
     vector,
 )
-from osimlite.simulation.kernels.layout import (
-    ARGUMENTS,
-    BALL,
-    EXTRA,
-    FREEDOMS,
-    MOTION,
-    OK,
-    OPERATION_AT,
-    OPERATION_INTS,
-    OPERATION_WORK,
-    POINT,
-    POSITION,
-    SCRATCH,
-    SINGULAR_RATES,
-    WORK_COLUMN,
-    WORK_OPERATION,
-)
+from osimlite.simulation.kernels.layout import LINK_WORK, MODEL, MOTION, OPERATION, OPERATION_WORK, OUTCOME, WORK
 from osimlite.simulation.kernels.motion import add_row, along_axes, axes_of, set_frame, set_row, turned_axes
+from osimlite.simulation.kernels.parts import operation_ints, operation_work
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.states import copy
 from osimlite.simulation.kernels.trigonometry import sine_cosine
@@ -41,9 +26,13 @@ from osimlite.simulation.kernels.trigonometry import sine_cosine
 
 def place_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Pass the frame in SCRATCH on by the motion."""
-    j = at(s, s[OPERATION_AT] + OPERATION_INTS * operation)
-    kept, frame, radii = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH), at(x, j[EXTRA])
-    angles = at(s, j[ARGUMENTS])
+    j = operation_ints(s, operation)
+    kept, frame, radii = (
+        operation_work(s, w, operation),
+        at(w, WORK.SCRATCH),
+        at(x, j[OPERATION.EXTRA]),
+    )
+    angles = at(s, j[OPERATION.ARGUMENTS])
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
     s3, c3 = sine_cosine(y[angles[2]])
@@ -52,38 +41,44 @@ def place_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
     two = -c2 * s3, c1 * c3 - s1 * s2 * s3, s1 * c3 + c1 * s2 * s3
     three = s2, -s1 * c2, c1 * c2
     end = elementwise(vector(radii, 0), three)
-    if j[MOTION] == BALL:
+    if j[OPERATION.MOTION] == MOTION.BALL:
         copy(12, frame, kept)
-        set_frame(frame, turned_axes(axes, (one, two, three)), plus(vector(frame, POSITION), along_axes(axes, end)))
+        set_frame(
+            frame, turned_axes(axes, (one, two, three)), plus(vector(frame, LINK_WORK.POSITION), along_axes(axes, end))
+        )
     else:
         axes = turned_axes(axes, ((one[0], two[0], three[0]), (one[1], two[1], three[1]), (one[2], two[2], three[2])))
-        set_frame(frame, axes, minus(vector(frame, POSITION), along_axes(axes, end)))
+        set_frame(frame, axes, minus(vector(frame, LINK_WORK.POSITION), along_axes(axes, end)))
         copy(12, frame, kept)
-    return OK
+    return OUTCOME.OK
 
 
 def move_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Columns of the three speeds, rates of the angles; velocity and own acceleration in SCRATCH."""
-    j = at(s, s[OPERATION_AT] + OPERATION_INTS * operation)
-    kept, result, radii = at(w, s[WORK_OPERATION] + OPERATION_WORK * operation), at(w, SCRATCH), at(x, j[EXTRA])
-    angles, u = at(s, j[ARGUMENTS]), at(y, s[FREEDOMS])
-    sign = 1.0 if j[MOTION] == BALL else -1.0
+    j = operation_ints(s, operation)
+    kept, result, radii = (
+        operation_work(s, w, operation),
+        at(w, WORK.SCRATCH),
+        at(x, j[OPERATION.EXTRA]),
+    )
+    angles, u = at(s, j[OPERATION.ARGUMENTS]), at(y, s[MODEL.DOFS])
+    sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
     n, far = last_axis(y, angles), vector(radii, 0)
-    arm, spin = minus(vector(kept, POINT), vector(result, 0)), (u[angles[0]], u[angles[1]], u[angles[2]])
+    arm, spin = minus(vector(kept, OPERATION_WORK.POINT), vector(result, 0)), (u[angles[0]], u[angles[1]], u[angles[2]])
     turn = shift = ZERO
     for k in range(3):
         axis = replaced(ZERO, k, 1.0)
         e = times(sign, turned(kept, axis))
         m = plus(times(sign, turned(kept, left_behind(far, axis, n))), cross(arm, e))
-        add_row(at(w, s[WORK_COLUMN] + 6 * angles[k]), 1.0, e, m)
+        add_row(at(w, s[MODEL.WORK_COLUMN] + 6 * angles[k]), 1.0, e, m)
         turn, shift = along(turn, spin[k], e), along(shift, spin[k], m)
     set_row(result, turn, shift)
     set_row(at(result, 6), times(sign, turned(kept, left_behind(far, spin, cross(spin, n)))), ZERO)
     if abs(sine_cosine(y[angles[1]])[1]) < 1e-12:
-        return SINGULAR_RATES
+        return OUTCOME.SINGULAR_RATES
     for k in range(3):
         f[angles[k]] = dot(angle_row(y, angles, k), spin)
-    return OK
+    return OUTCOME.OK
 
 
 def angle_row(y: Floats, angles: Ints, part: int) -> Vector:

@@ -54,13 +54,13 @@ from osimlite.simulation.kernels.cable_surfaces import (
     shoot,
     value,
 )
-from osimlite.simulation.kernels.layout import NUMBERS, OK, OWN, RECORD
+from osimlite.simulation.kernels.layout import ITEM, OUTCOME
 from osimlite.simulation.kernels.least_squares import factor_room, factorise, minimum_norm
 from osimlite.simulation.kernels.paths import LENGTH, SPEED, TENSION
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import apply_force, place_frame, station, velocity
 
-COUNT, SOLVER, ELEMENTS = OWN + 1, OWN + 2, OWN + 3
+COUNT, SOLVER, ELEMENTS = ITEM.OWN + 1, ITEM.OWN + 2, ITEM.OWN + 3
 """Integers of a cable: how many elements it has, where in its record room for the search is, and the elements."""
 ELEMENT_INTS = 4
 IS_OBSTACLE, LINK, AT, KEPT = 0, 1, 2, 3
@@ -102,8 +102,8 @@ def solver_room(obstacles: int) -> int:
 
 def cable_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Length and speed of a cable; NaN if it is none, since a point is inside an obstacle."""
-    i, p = at(s, item), at(x, s[item + NUMBERS])
-    result = at(w, i[RECORD])
+    i, p = at(s, item), at(x, s[item + ITEM.NUMBERS])
+    result = at(w, i[ITEM.RECORD])
     elements = at(i, ELEMENTS)
     for k in range(i[COUNT]):
         place_element(s, w, at(elements, ELEMENT_INTS * k), p, result)
@@ -113,7 +113,7 @@ def cable_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
             length += span(elements, p, result, first, k, at(result, i[SOLVER]))
             first = k
     result[LENGTH], result[SPEED] = length, speed(s, w, i[COUNT], elements, result)
-    return OK
+    return OUTCOME.OK
 
 
 def place_element(s: Ints, w: Floats, element: Ints, p: Floats, found: Floats) -> None:
@@ -401,11 +401,11 @@ def speed(s: Ints, w: Floats, count: int, elements: Ints, found: Floats) -> floa
 
 def pull_cable(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Pull at the points of a cable and at both ends of each geodesic; a cable does not push."""
-    i, p = at(s, item), at(x, s[item + NUMBERS])
-    result, elements = at(w, i[RECORD]), at(i, ELEMENTS)
+    i, p = at(s, item), at(x, s[item + ITEM.NUMBERS])
+    result, elements = at(w, i[ITEM.RECORD]), at(i, ELEMENTS)
     tension, last = result[TENSION], i[COUNT] - 1
     if tension < 0.0:
-        return OK
+        return OUTCOME.OK
     for k in range(last + 1):
         element = at(elements, ELEMENT_INTS * k)
         own, kept, link = at(p, element[AT]), at(result, element[KEPT]), element[LINK]
@@ -419,4 +419,4 @@ def pull_cable(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
             start, end = at(kept, GROUND_START), at(kept, GROUND_END)
             apply_force(s, w, link, vector(start, POINT), times(-tension, vector(start, ALONG)))
             apply_force(s, w, link, vector(end, POINT), times(tension, vector(end, ALONG)))
-    return OK
+    return OUTCOME.OK

@@ -11,77 +11,49 @@ from __future__ import annotations
 from osimlite.forces.vectors import ZERO, cross, dot, put, replaced, times, vector
 from osimlite.simulation.kernels.ball_joint import angle_drift, angle_row, last_axis
 from osimlite.simulation.kernels.layout import (
-    ABOVE,
-    ACCELERATION,
-    AMOUNT,
-    AMOUNT_OF,
-    ANGLE,
-    ARGUMENT_COUNT,
-    ARGUMENTS,
-    AXIS,
     CHAIN,
-    CURVATURE,
-    ELLIPSOID,
-    END_ENTRY,
-    ENTRY_AT,
-    EXCESS_AT,
-    EXCESSES,
-    EXTRA,
-    FIRST_SHARE,
-    FREEDOM_AT,
-    FREEDOM_INTS,
-    FREEDOMS,
-    GRADIENT,
-    JOINT_AT,
-    JOINT_INTS,
-    JOINTS,
-    KIND,
-    LINE,
+    DOF,
+    JOINT,
+    JOINT_KIND,
     LINK_WORK,
-    OK,
-    OPERATION_AT,
-    OPERATION_INTS,
+    MODEL,
+    OPERATION,
     OPERATION_WORK,
-    PART,
-    PRODUCT_AT,
-    PRODUCTS,
-    RATE,
-    ROW,
-    SHARE_AT,
-    SHARES,
-    SOURCE,
-    SUPPLY,
-    WORK_COLUMN,
-    WORK_JOINTS,
-    WORK_LINK,
-    WORK_OPERATION,
-    WORK_SHARES,
+    OUTCOME,
 )
+from osimlite.simulation.kernels.parts import link_work, operation_ints, operation_work
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
 
 def chain_dynamics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> int:
     """Mass matrix, and the bias taken off the generalized forces; f has the rates and these before."""
-    h, right = at(s, s[CHAIN]), at(f, s[FREEDOMS])
+    h, right = at(s, s[MODEL.CHAIN]), at(f, s[MODEL.DOFS])
     move_joints(s, x, w, y, f)
-    status = call(h[SUPPLY], s, x, w, y, f, 0)
-    if status != OK:
+    status = call(h[CHAIN.SUPPLY], s, x, w, y, f, 0)
+    if status != OUTCOME.OK:
         return status
-    forces, shares = at(w, h[WORK_JOINTS] + 3 * h[JOINTS]), at(w, h[WORK_SHARES])
-    matrix = at(forces, h[JOINTS])
-    for k in range(h[SHARES]):
-        joint, freedom = s[h[SHARE_AT] + 2 * k], s[h[SHARE_AT] + 2 * k + 1]
+    forces, shares = at(w, h[CHAIN.WORK_JOINTS] + 3 * h[CHAIN.JOINTS]), at(w, h[CHAIN.WORK_SHARES])
+    matrix = at(forces, h[CHAIN.JOINTS])
+    for k in range(h[CHAIN.SHARES]):
+        joint, freedom = s[h[CHAIN.SHARE_AT] + 2 * k], s[h[CHAIN.SHARE_AT] + 2 * k + 1]
         if freedom >= 0:
             right[freedom] -= shares[k] * forces[joint]
-    for k in range(h[ENTRY_AT], h[END_ENTRY]):
+    for k in range(h[CHAIN.ENTRY_AT], h[CHAIN.END_ENTRY]):
         w[k] = 0.0
-    for k in range(h[PRODUCTS]):
-        product = at(s, h[PRODUCT_AT] + 4 * k)
+    for k in range(h[CHAIN.PRODUCTS]):
+        product = at(s, h[CHAIN.PRODUCT_AT] + 4 * k)
         w[product[3]] += shares[product[0]] * shares[product[1]] * matrix[product[2]]
-    for k in range(h[EXCESSES]):
-        excess = at(s, h[EXCESS_AT] + 3 * k)
-        take_off(s, w, x[excess[2]], excess[1], at(w, s[WORK_LINK] + LINK_WORK * excess[0] + ACCELERATION), right)
-    return OK
+    for k in range(h[CHAIN.EXCESSES]):
+        excess = at(s, h[CHAIN.EXCESS_AT] + 3 * k)
+        take_off(
+            s,
+            w,
+            x[excess[2]],
+            excess[1],
+            at(link_work(s, w, excess[0]), LINK_WORK.ACCELERATION),
+            right,
+        )
+    return OUTCOME.OK
 
 
 def take_off(s: Ints, w: Floats, moment: float, freedom: int, acceleration: Floats, right: Floats) -> None:
@@ -95,49 +67,62 @@ def take_off(s: Ints, w: Floats, moment: float, freedom: int, acceleration: Floa
         acceleration: of the link without udot.
         right: the generalized forces.
     """
-    freedoms, columns = at(s, s[FREEDOM_AT]), at(w, s[WORK_COLUMN])
+    freedoms, columns = at(s, s[MODEL.DOF_AT]), at(w, s[MODEL.WORK_COLUMN])
     while freedom >= 0:
-        a, row, other, place = at(columns, 6 * freedom), at(w, freedoms[FREEDOM_INTS * freedom + ROW]), freedom, 0
+        a, row, other, place = at(columns, 6 * freedom), at(w, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
         right[freedom] += moment * (a[0] * acceleration[0] + a[1] * acceleration[1] + a[2] * acceleration[2])
         while other >= 0:
             b = at(columns, 6 * other)
             row[place] -= moment * (a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-            other = freedoms[FREEDOM_INTS * other + ABOVE]
+            other = freedoms[DOF.SIZE * other + DOF.ABOVE]
             place += 1
-        freedom = freedoms[FREEDOM_INTS * freedom + ABOVE]
+        freedom = freedoms[DOF.SIZE * freedom + DOF.ABOVE]
 
 
 def move_joints(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
     """Values, rates, and accelerations without udot of all joints, and the shares; f has the rates of coordinates."""
-    h = at(s, s[CHAIN])
-    count = h[JOINTS]
+    h = at(s, s[MODEL.CHAIN])
+    count = h[CHAIN.JOINTS]
     for number in range(count):
-        joint, moves = at(s, h[JOINT_AT] + JOINT_INTS * number), at(w, h[WORK_JOINTS] + number)
-        kind, source, part, shares = joint[KIND], joint[SOURCE], joint[PART], at(w, h[WORK_SHARES] + joint[FIRST_SHARE])
-        if kind == LINE:
+        joint, moves = at(s, h[CHAIN.JOINT_AT] + JOINT.SIZE * number), at(w, h[CHAIN.WORK_JOINTS] + number)
+        kind, source, part, shares = (
+            joint[JOINT.KIND],
+            joint[JOINT.SOURCE],
+            joint[JOINT.PART],
+            at(w, h[CHAIN.WORK_SHARES] + joint[JOINT.FIRST_SHARE]),
+        )
+        if kind == JOINT_KIND.LINE:
             factor = x[part]
             shares[0] = factor
             moves[0], moves[count], moves[2 * count] = factor * y[source], factor * f[source], 0.0
             continue
-        j = at(s, s[OPERATION_AT] + OPERATION_INTS * source)
-        a = at(w, s[WORK_OPERATION] + OPERATION_WORK * source)
-        if kind == AMOUNT_OF:
-            for k in range(j[ARGUMENT_COUNT]):
-                shares[k] = w[j[GRADIENT] + k]
-            moves[0], moves[count], moves[2 * count] = a[AMOUNT], a[RATE], a[CURVATURE]
-        elif kind == ANGLE:
-            angles = at(s, j[ARGUMENTS])
+        j = operation_ints(s, source)
+        a = operation_work(s, w, source)
+        if kind == JOINT_KIND.AMOUNT_OF:
+            for k in range(j[OPERATION.ARGUMENT_COUNT]):
+                shares[k] = w[j[OPERATION.GRADIENT] + k]
+            moves[0], moves[count], moves[2 * count] = (
+                a[OPERATION_WORK.AMOUNT],
+                a[OPERATION_WORK.RATE],
+                a[OPERATION_WORK.CURVATURE],
+            )
+        elif kind == JOINT_KIND.ANGLE:
+            angles = at(s, j[OPERATION.ARGUMENTS])
             moves[0], moves[count] = y[angles[part]], f[angles[part]]
             moves[2 * count] = move_angle(angles, y, f, part, shares)
-        elif kind == ELLIPSOID:
+        elif kind == JOINT_KIND.ELLIPSOID:
             moves[0], moves[count], moves[2 * count] = move_end(
-                at(s, j[ARGUMENTS]), y, at(y, s[FREEDOMS]), part, x[j[EXTRA] + part], shares
+                at(s, j[OPERATION.ARGUMENTS]), y, at(y, s[MODEL.DOFS]), part, x[j[OPERATION.EXTRA] + part], shares
             )
         else:
             # The joint stands still, and accelerates all the same.
-            turn = at(a, AXIS + part)
+            turn = at(a, OPERATION_WORK.AXIS + part)
             moves[0] = moves[count] = 0.0
-            moves[2 * count] = turn[0] * a[AMOUNT] + turn[3] * a[RATE] + turn[6] * a[CURVATURE]
+            moves[2 * count] = (
+                turn[0] * a[OPERATION_WORK.AMOUNT]
+                + turn[3] * a[OPERATION_WORK.RATE]
+                + turn[6] * a[OPERATION_WORK.CURVATURE]
+            )
 
 
 def move_angle(angles: Ints, y: Floats, f: Floats, part: int, row: Floats) -> float:

@@ -19,24 +19,7 @@ from osimlite.simulation.kernels.dynamics import (
     generalized_forces,
     spatial_inertias_and_bias,
 )
-from osimlite.simulation.kernels.layout import (
-    ABOVE,
-    CONSTRAINED,
-    DEPTH,
-    EQUATIONS,
-    FREEDOM_AT,
-    FREEDOM_INTS,
-    FREEDOMS,
-    LAWS,
-    OK,
-    RESPONSE_AT,
-    RESPONSE_INTS,
-    RESPONSES,
-    ROW,
-    SCRATCH,
-    VELOCITY_STAGE,
-    WORK_ROWS,
-)
+from osimlite.simulation.kernels.layout import CONSTRAINED, DOF, MODEL, OUTCOME, RESPONSE_INTS, STAGE, WORK
 from osimlite.simulation.kernels.least_squares import cholesky, substitute
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
@@ -70,26 +53,26 @@ def condensation_room(size: int, responses: int) -> int:
 
 def linearise(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, room: Floats) -> int:
     """Fill the room with masses, generalized forces and derivatives at a state; f is room for its rates."""
-    size = s[FREEDOMS]
+    size = s[MODEL.DOFS]
     right = at(f, size)
-    status = call(s[LAWS], s, x, w, y, f, VELOCITY_STAGE)
-    if status != OK:
+    status = call(s[MODEL.LAWS], s, x, w, y, f, STAGE.VELOCITY)
+    if status != OUTCOME.OK:
         return status
-    if s[CONSTRAINED] > 0:
+    if s[MODEL.CONSTRAINED] > 0:
         bind(s, x, w, y, f)
     spatial_inertias_and_bias(s, x, w)
     composite_rigid_body(s, w, right)
     masses(s, w, room)
-    for number in range(s[RESPONSES]):
-        response, known = at(s, s[RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
+    for number in range(s[MODEL.RESPONSES]):
+        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
         clear_wrenches(s, w)
         for k in range(size):
             right[k] = 0.0
         status = call(response[KERNEL], s, x, w, y, f, response[ITEM])
-        if status != OK:
+        if status != OUTCOME.OK:
             return status
         for k in range(INVERSE):
-            known[size + k] = w[SCRATCH + k]
+            known[size + k] = w[WORK.SCRATCH + k]
         generalized_forces(s, w, right)
         first, end = size, 0
         for k in range(size):
@@ -97,31 +80,31 @@ def linearise(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, room: Floats)
             if abs(right[k]) > SLIGHT:
                 first, end = min(first, k), k + 1
         known[size + FIRST], known[size + END] = first, end
-    return OK
+    return OUTCOME.OK
 
 
 def known_of(s: Ints, room: Floats, number: int) -> Floats:
     """The part of the room of a force: its generalized force of 1 N, and what RESPONSE_WORK tells."""
-    size = s[FREEDOMS]
+    size = s[MODEL.DOFS]
     return at(room, 2 * size * size + size + number * (size + RESPONSE_WORK))
 
 
 def masses(s: Ints, w: Floats, mass: Floats) -> None:
     """The mass matrix (n, n), heavy across the constraints."""
-    size, freedoms, largest = s[FREEDOMS], at(s, s[FREEDOM_AT]), 0.0
+    size, freedoms, largest = s[MODEL.DOFS], at(s, s[MODEL.DOF_AT]), 0.0
     for k in range(size * size):
         mass[k] = 0.0
     for k in range(size):
-        j, i = at(freedoms, FREEDOM_INTS * k), k
-        row = at(w, j[ROW])
+        j, i = at(freedoms, DOF.SIZE * k), k
+        row = at(w, j[DOF.ROW])
         largest = max(largest, row[0])
-        for m in range(j[DEPTH] + 1):
+        for m in range(j[DOF.DEPTH] + 1):
             mass[size * k + i] = mass[size * i + k] = row[m]
-            i = freedoms[FREEDOM_INTS * i + ABOVE]
-    if s[CONSTRAINED] > 0:
-        h = at(s, s[CONSTRAINED])
-        for equation in range(h[EQUATIONS]):
-            row, square = at(w, h[WORK_ROWS] + size * equation), 0.0
+            i = freedoms[DOF.SIZE * i + DOF.ABOVE]
+    if s[MODEL.CONSTRAINED] > 0:
+        h = at(s, s[MODEL.CONSTRAINED])
+        for equation in range(h[CONSTRAINED.EQUATIONS]):
+            row, square = at(w, h[CONSTRAINED.WORK_ROWS] + size * equation), 0.0
             for k in range(size):
                 square += row[k] * row[k]
             if square > 0.0:
@@ -139,12 +122,12 @@ def add_square(size: int, factor: float, row: Floats, first: int, end: int, matr
 
 def condense(s: Ints, c: float, room: Floats) -> bool:
     """Eliminate all but the speeds from 1 - c J; whether that can be solved."""
-    size = s[FREEDOMS]
+    size = s[MODEL.DOFS]
     system = at(room, size * size)
     for k in range(size * size):
         system[k] = room[k]
-    for number in range(s[RESPONSES]):
-        response, known = at(s, s[RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
+    for number in range(s[MODEL.RESPONSES]):
+        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
         count, places, a = response[STATES], at(s, response[ITEM] + response[FIRST_STATE]), at(known, size)
         inverse, gains, pulls, driven = at(a, INVERSE), at(a, GAINS), at(a, PULLS), at(a, RIGHT)
         for i in range(count):
@@ -188,14 +171,14 @@ def invert(size: int, a: Floats) -> None:
 
 def correct(s: Ints, c: float, room: Floats, d: Floats) -> None:
     """Solve (1 - c J) d = r in place, after `condense` with the same c."""
-    size = s[FREEDOMS]
+    size = s[MODEL.DOFS]
     du, system, right = at(d, size), at(room, size * size), at(room, 2 * size * size)
     for i in range(size):
         right[i] = 0.0
         for k in range(size):
             right[i] += room[size * i + k] * du[k]
-    for number in range(s[RESPONSES]):
-        response, known = at(s, s[RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
+    for number in range(s[MODEL.RESPONSES]):
+        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
         places, a = at(s, response[ITEM] + response[FIRST_STATE]), at(known, size)
         first, end = int(a[FIRST]), int(a[END])
         force = a[LEVER] * response[SENSE] * product(first, end, known, d)
@@ -205,8 +188,8 @@ def correct(s: Ints, c: float, room: Floats, d: Floats) -> None:
         for k in range(first, end):
             right[k] += c * force * known[k]
     substitute(size, system, right)
-    for number in range(s[RESPONSES]):
-        response, known = at(s, s[RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
+    for number in range(s[MODEL.RESPONSES]):
+        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
         count, places, a = response[STATES], at(s, response[ITEM] + response[FIRST_STATE]), at(known, size)
         first, end = int(a[FIRST]), int(a[END])
         displacement = response[SENSE] * product(first, end, known, d)

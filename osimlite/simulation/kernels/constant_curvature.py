@@ -4,20 +4,8 @@ from __future__ import annotations
 
 from math import acos, cos, sin
 
-from osimlite.simulation.kernels.layout import (
-    AMOUNT,
-    ARGUMENTS,
-    CURVATURE,
-    EXTRA,
-    FREEDOMS,
-    GRADIENT,
-    OK,
-    OPERATION_AT,
-    OPERATION_INTS,
-    OPERATION_WORK,
-    RATE,
-    WORK_OPERATION,
-)
+from osimlite.simulation.kernels.layout import MODEL, OPERATION, OPERATION_WORK, OUTCOME
+from osimlite.simulation.kernels.parts import operation_ints, operation_work
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 
 COMPONENT, LENGTH, NEUTRAL, TERMS, SERIES = 2, 3, 4, 6, 7
@@ -27,9 +15,12 @@ series by the square of the angle, and the terms of (sin θ) / θ and (1 - cos �
 
 def amount_by_arc(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Amount of an operation by the bending of a rod in two angles, with its derivatives."""
-    j, kept = at(s, s[OPERATION_AT] + OPERATION_INTS * operation), at(w, s[WORK_OPERATION] + OPERATION_WORK * operation)
-    one, two, p = s[j[ARGUMENTS]], s[j[ARGUMENTS] + 1], at(x, j[EXTRA])
-    table, u = at(p, 2), at(y, s[FREEDOMS])
+    j, kept = (
+        operation_ints(s, operation),
+        operation_work(s, w, operation),
+    )
+    one, two, p = s[j[OPERATION.ARGUMENTS]], s[j[OPERATION.ARGUMENTS] + 1], at(x, j[OPERATION.EXTRA])
+    table, u = at(p, 2), at(y, s[MODEL.DOFS])
     a = (y[one] if one >= 0 else p[0]) + table[NEUTRAL]
     b = (y[two] if two >= 0 else p[1]) + table[NEUTRAL + 1]
     ua, ub = u[one] if one >= 0 else 0.0, u[two] if two >= 0 else 0.0
@@ -51,10 +42,10 @@ def amount_by_arc(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation
     daa = size * (v * oaa + share * vaa + 2.0 * va * oa)
     dab = size * (v * oab + share * vab + va * ob + vb * oa)
     dbb = size * (v * obb + share * vbb + 2.0 * vb * ob)
-    w[j[GRADIENT]], w[j[GRADIENT] + 1] = da, db
-    kept[AMOUNT], kept[RATE] = size * v * share, da * ua + db * ub
-    kept[CURVATURE] = daa * ua * ua + 2.0 * dab * ua * ub + dbb * ub * ub
-    return OK
+    w[j[OPERATION.GRADIENT]], w[j[OPERATION.GRADIENT] + 1] = da, db
+    kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE] = size * v * share, da * ua + db * ub
+    kept[OPERATION_WORK.CURVATURE] = daa * ua * ua + 2.0 * dab * ua * ub + dbb * ub * ub
+    return OUTCOME.OK
 
 
 def along_the_arc(table: Floats, cosine: float) -> tuple[float, float, float]:

@@ -12,61 +12,39 @@ from math import sqrt
 from osimlite.multibody.dynamics import SAFE_MASS, SLIGHT
 from osimlite.multibody.linear import REDUNDANT, ROUNDING
 from osimlite.simulation.kernels.dynamics import SMALLEST_PIVOT, solve
-from osimlite.simulation.kernels.layout import (
-    ABOVE,
-    CONSTRAINED,
-    CONSTRAINT_AT,
-    CONSTRAINTS,
-    DEPTH,
-    ENTRIES,
-    EQUATIONS,
-    FREEDOM_AT,
-    FREEDOM_INTS,
-    FREEDOMS,
-    LAW,
-    LAWS,
-    OK,
-    ROW,
-    SINGULAR_MASS,
-    WORK_DRIFTS,
-    WORK_FACTOR,
-    WORK_PIVOT,
-    WORK_RATES,
-    WORK_ROWS,
-    WORK_SYSTEM,
-)
+from osimlite.simulation.kernels.layout import CONSTRAINED, DOF, ITEM, MODEL, OUTCOME
 from osimlite.simulation.kernels.least_squares import apply_q, cholesky, factored, solved, substitute
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
 
 def constrained_dynamics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> int:
     """Solve for the accelerations: the second half of f has the generalized forces before."""
-    h, size = at(s, s[CONSTRAINED]), s[FREEDOMS]
+    h, size = at(s, s[MODEL.CONSTRAINED]), s[MODEL.DOFS]
     right = at(f, size)
     bind(s, x, w, y, f)
     # Of the mass matrix and the forces, nothing is left when they have been solved for.
-    system, matrix = at(w, h[WORK_SYSTEM]), at(w, s[s[FREEDOM_AT] + ROW])
-    for k in range(h[ENTRIES]):
+    system, matrix = at(w, h[CONSTRAINED.WORK_SYSTEM]), at(w, s[s[MODEL.DOF_AT] + DOF.ROW])
+    for k in range(h[CONSTRAINED.ENTRIES]):
         system[k] = matrix[k]
-    forces = at(system, h[ENTRIES])
+    forces = at(system, h[CONSTRAINED.ENTRIES])
     for k in range(size):
         forces[k] = right[k]
     if solve(s, w, right) < 0 and by_multipliers(s, w, right, at(forces, size)):
-        return OK
+        return OUTCOME.OK
     return by_directions(s, w, system, forces, right, at(forces, size))
 
 
 def bind(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
     """Fill in all equations; f has the rates of the coordinates."""
-    h, size = at(s, s[CONSTRAINED]), s[FREEDOMS]
-    rows, rates = at(w, h[WORK_ROWS]), at(w, h[WORK_RATES])
-    for k in range(h[EQUATIONS] * size):
+    h, size = at(s, s[MODEL.CONSTRAINED]), s[MODEL.DOFS]
+    rows, rates = at(w, h[CONSTRAINED.WORK_ROWS]), at(w, h[CONSTRAINED.WORK_RATES])
+    for k in range(h[CONSTRAINED.EQUATIONS] * size):
         rows[k] = 0.0
-    for k in range(h[EQUATIONS]):
+    for k in range(h[CONSTRAINED.EQUATIONS]):
         rates[k] = 0.0
-    for number in range(h[CONSTRAINTS]):
-        constraint = s[h[CONSTRAINT_AT] + number]
-        call(s[LAWS + s[constraint + LAW]], s, x, w, y, f, constraint)
+    for number in range(h[CONSTRAINED.CONSTRAINTS]):
+        constraint = s[h[CONSTRAINED.CONSTRAINT_AT] + number]
+        call(s[MODEL.LAWS + s[constraint + ITEM.LAW]], s, x, w, y, f, constraint)
 
 
 def by_multipliers(s: Ints, w: Floats, right: Floats, room: Floats) -> bool:
@@ -74,15 +52,19 @@ def by_multipliers(s: Ints, w: Floats, right: Floats, room: Floats) -> bool:
 
     With M = Uᵀ D U the equations of what U and D make of udot have as their shortest solution the multipliers' push.
     """
-    h, size = at(s, s[CONSTRAINED]), s[FREEDOMS]
-    count, freedoms, pivots = h[EQUATIONS], at(s, s[FREEDOM_AT]), at(w, s[WORK_PIVOT])
+    h, size = at(s, s[MODEL.CONSTRAINED]), s[MODEL.DOFS]
+    count, freedoms, pivots = h[CONSTRAINED.EQUATIONS], at(s, s[MODEL.DOF_AT]), at(w, s[MODEL.WORK_PIVOT])
     scales, push, values, spare = room, at(room, size), at(room, 2 * size), at(room, 2 * size + count)
     for k in range(size):
-        pivot = w[freedoms[FREEDOM_INTS * k + ROW]]
+        pivot = w[freedoms[DOF.SIZE * k + DOF.ROW]]
         if not pivot > SAFE_MASS * pivots[k]:
             return False
         scales[k] = 1.0 / sqrt(pivot)
-    rows, drifts, weighted = at(w, h[WORK_ROWS]), at(w, h[WORK_DRIFTS]), at(w, h[WORK_FACTOR])
+    rows, drifts, weighted = (
+        at(w, h[CONSTRAINED.WORK_ROWS]),
+        at(w, h[CONSTRAINED.WORK_DRIFTS]),
+        at(w, h[CONSTRAINED.WORK_FACTOR]),
+    )
     for i in range(count):
         row, turned, longest = at(rows, size * i), at(weighted, size * i), 0.0
         for k in range(size):
@@ -111,33 +93,38 @@ def by_multipliers(s: Ints, w: Floats, right: Floats, room: Floats) -> bool:
 
 def toward_ground(s: Ints, w: Floats, right: Floats) -> None:
     """Solve with Uᵀ of the factor that `solve` left, in place."""
-    freedoms = at(s, s[FREEDOM_AT])
-    for k in range(s[FREEDOMS] - 1, -1, -1):
-        j, load = at(freedoms, FREEDOM_INTS * k), right[k]
+    freedoms = at(s, s[MODEL.DOF_AT])
+    for k in range(s[MODEL.DOFS] - 1, -1, -1):
+        j, load = at(freedoms, DOF.SIZE * k), right[k]
         if load == 0.0:
             continue
-        row, i = at(w, j[ROW]), j[ABOVE]
-        for m in range(1, j[DEPTH] + 1):
+        row, i = at(w, j[DOF.ROW]), j[DOF.ABOVE]
+        for m in range(1, j[DOF.DEPTH] + 1):
             right[i] -= row[m] * load
-            i = freedoms[FREEDOM_INTS * i + ABOVE]
+            i = freedoms[DOF.SIZE * i + DOF.ABOVE]
 
 
 def away_from_ground(s: Ints, w: Floats, right: Floats) -> None:
     """Solve with U of the factor that `solve` left, in place."""
-    freedoms = at(s, s[FREEDOM_AT])
-    for k in range(s[FREEDOMS]):
-        j, total = at(freedoms, FREEDOM_INTS * k), right[k]
-        row, i = at(w, j[ROW]), j[ABOVE]
-        for m in range(1, j[DEPTH] + 1):
+    freedoms = at(s, s[MODEL.DOF_AT])
+    for k in range(s[MODEL.DOFS]):
+        j, total = at(freedoms, DOF.SIZE * k), right[k]
+        row, i = at(w, j[DOF.ROW]), j[DOF.ABOVE]
+        for m in range(1, j[DOF.DEPTH] + 1):
             total -= row[m] * right[i]
-            i = freedoms[FREEDOM_INTS * i + ABOVE]
+            i = freedoms[DOF.SIZE * i + DOF.ABOVE]
         right[k] = total
 
 
 def by_directions(s: Ints, w: Floats, matrix: Floats, forces: Floats, right: Floats, room: Floats) -> int:
     """The accelerations by the null space of the equations; room for 2 n (n + 1) numbers, or 2 m more than that."""
-    h, size = at(s, s[CONSTRAINED]), s[FREEDOMS]
-    count, rows, drifts, equations = h[EQUATIONS], at(w, h[WORK_ROWS]), at(w, h[WORK_DRIFTS]), at(w, h[WORK_FACTOR])
+    h, size = at(s, s[MODEL.CONSTRAINED]), s[MODEL.DOFS]
+    count, rows, drifts, equations = (
+        h[CONSTRAINED.EQUATIONS],
+        at(w, h[CONSTRAINED.WORK_ROWS]),
+        at(w, h[CONSTRAINED.WORK_DRIFTS]),
+        at(w, h[CONSTRAINED.WORK_FACTOR]),
+    )
     # All equations weigh the same, but those that are rounding errors.
     values, spare = room, at(room, count)
     longest = 0.0
@@ -176,25 +163,25 @@ def by_directions(s: Ints, w: Floats, matrix: Floats, forces: Floats, right: Flo
             total += direction[k] * forces[k]
         rest[j] = total
     if not cholesky(free, reduced, SMALLEST_PIVOT):
-        return SINGULAR_MASS
+        return OUTCOME.SINGULAR_MASS
     substitute(free, reduced, rest)
     for j in range(free):
         for k in range(size):
             right[k] += rest[j] * basis[size * j + k]
-    return OK
+    return OUTCOME.OK
 
 
 def times_mass(s: Ints, matrix: Floats, u: Floats, found: Floats) -> None:
     """The mass matrix, of which the rows stand one after the other, times a vector."""
-    size, freedoms, place = s[FREEDOMS], at(s, s[FREEDOM_AT]), 0
+    size, freedoms, place = s[MODEL.DOFS], at(s, s[MODEL.DOF_AT]), 0
     for k in range(size):
         found[k] = 0.0
     for k in range(size):
-        j = at(freedoms, FREEDOM_INTS * k)
+        j = at(freedoms, DOF.SIZE * k)
         found[k] += matrix[place] * u[k]
-        i = j[ABOVE]
-        for m in range(1, j[DEPTH] + 1):
+        i = j[DOF.ABOVE]
+        for m in range(1, j[DOF.DEPTH] + 1):
             found[k] += matrix[place + m] * u[i]
             found[i] += matrix[place + m] * u[k]
-            i = freedoms[FREEDOM_INTS * i + ABOVE]
-        place += j[DEPTH] + 1
+            i = freedoms[DOF.SIZE * i + DOF.ABOVE]
+        place += j[DOF.DEPTH] + 1

@@ -10,31 +10,8 @@ from __future__ import annotations
 from osimlite.forces.vectors import ZERO, Vector, cross, dot, minus, norm, over, plus, times, vector
 from osimlite.simulation.kernels.ball_joint import angle_drift, angle_row
 from osimlite.simulation.kernels.functions import MONOMIALS, several_at, value_at
-from osimlite.simulation.kernels.layout import (
-    ABOVE,
-    CONSTRAINED,
-    CONSTRAINT_OWN,
-    END_EQUATION,
-    END_FREEDOM,
-    FIRST_EQUATION,
-    FREEDOM_AT,
-    FREEDOM_INTS,
-    FREEDOMS,
-    LINK_AT,
-    LINK_INTS,
-    LINK_WORK,
-    NUMBERS,
-    OK,
-    ORIGIN,
-    PARENT,
-    TIME,
-    WORK_COLUMN,
-    WORK_DRIFTS,
-    WORK_ERRORS,
-    WORK_LINK,
-    WORK_RATES,
-    WORK_ROWS,
-)
+from osimlite.simulation.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, ITEM, LINK, LINK_WORK, MODEL, OUTCOME, WORK
+from osimlite.simulation.kernels.parts import link_ints, link_work
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import (
     acceleration,
@@ -60,14 +37,14 @@ COORDINATE_INTS = 3
 
 def prescribe(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int) -> int:
     """A coordinate follows a function of time, whose table is all its numbers."""
-    i, h = at(s, constraint), at(s, s[CONSTRAINED])
-    row, own = i[FIRST_EQUATION], at(i, CONSTRAINT_OWN)
-    value, slope, curvature = value_at(at(x, i[NUMBERS]), w[TIME])
-    w[h[WORK_ERRORS] + row] = y[own[0]] - value
-    w[h[WORK_RATES] + row] = slope
-    bias = add_coordinate(s, y, f, own, 1.0, at(w, h[WORK_ROWS] + s[FREEDOMS] * row))
-    w[h[WORK_DRIFTS] + row] = curvature - bias
-    return OK
+    i, h = at(s, constraint), at(s, s[MODEL.CONSTRAINED])
+    row, own = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
+    value, slope, curvature = value_at(at(x, i[ITEM.NUMBERS]), w[WORK.TIME])
+    w[h[CONSTRAINED.WORK_ERRORS] + row] = y[own[0]] - value
+    w[h[CONSTRAINED.WORK_RATES] + row] = slope
+    bias = add_coordinate(s, y, f, own, 1.0, at(w, h[CONSTRAINED.WORK_ROWS] + s[MODEL.DOFS] * row))
+    w[h[CONSTRAINED.WORK_DRIFTS] + row] = curvature - bias
+    return OUTCOME.OK
 
 
 def couple(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int) -> int:
@@ -77,8 +54,8 @@ def couple(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int)
     degrees of freedom, and each coordinate again in full; its numbers the values of coordinates at rest, the dependent
     one first, and the table of the function.
     """
-    i, h, p = at(s, constraint), at(s, s[CONSTRAINED]), at(x, s[constraint + NUMBERS])
-    row, own = i[FIRST_EQUATION], at(i, CONSTRAINT_OWN)
+    i, h, p = at(s, constraint), at(s, s[MODEL.CONSTRAINED]), at(x, s[constraint + ITEM.NUMBERS])
+    row, own = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
     size, freedoms = own[COORDINATE_INTS + 1], at(own, COORDINATE_INTS + 2)
     others, gradient, constants = at(freedoms, size), at(w, own[COORDINATE_INTS]), at(p, 1)
     if int(constants[size]) >= MONOMIALS:
@@ -91,13 +68,13 @@ def couple(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int)
         value, slope, bend = value_at(at(constants, size), argument)
         curvature = bend * rate * rate
         gradient[0] = slope
-    to = at(w, h[WORK_ROWS] + s[FREEDOMS] * row)
+    to = at(w, h[CONSTRAINED.WORK_ROWS] + s[MODEL.DOFS] * row)
     bias = add_coordinate(s, y, f, own, -1.0, to)
     for k in range(size):
         bias += add_coordinate(s, y, f, at(others, COORDINATE_INTS * k), gradient[k], to)
-    w[h[WORK_ERRORS] + row] = value - (y[own[0]] if own[0] >= 0 else p[0])
-    w[h[WORK_DRIFTS] + row] = -bias - curvature
-    return OK
+    w[h[CONSTRAINED.WORK_ERRORS] + row] = value - (y[own[0]] if own[0] >= 0 else p[0])
+    w[h[CONSTRAINED.WORK_DRIFTS] + row] = -bias - curvature
+    return OUTCOME.OK
 
 
 def add_coordinate(s: Ints, y: Floats, f: Floats, coordinate: Ints, factor: float, row: Floats) -> float:
@@ -117,15 +94,15 @@ def add_coordinate(s: Ints, y: Floats, f: Floats, coordinate: Ints, factor: floa
 
 def bind_bodies(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int) -> int:
     """Some equations between bodies; its integers and numbers are theirs."""
-    i, h = at(s, constraint), at(s, s[CONSTRAINED])
-    first, size = i[FIRST_EQUATION], s[FREEDOMS]
-    for row in range(first, i[END_EQUATION]):
+    i, h = at(s, constraint), at(s, s[MODEL.CONSTRAINED])
+    first, size = i[CONSTRAINT.FIRST_EQUATION], s[MODEL.DOFS]
+    for row in range(first, i[CONSTRAINT.END_EQUATION]):
         own, p = (
-            at(i, CONSTRAINT_OWN + EQUATION_INTS * (row - first)),
-            at(x, i[NUMBERS] + EQUATION_NUMBERS * (row - first)),
+            at(i, CONSTRAINT.OWN + EQUATION_INTS * (row - first)),
+            at(x, i[ITEM.NUMBERS] + EQUATION_NUMBERS * (row - first)),
         )
         one, two, wanted = at(own, 1), at(own, 1 + VECTOR_INTS), p[12]
-        to = at(w, h[WORK_ROWS] + size * row)
+        to = at(w, h[CONSTRAINED.WORK_ROWS] + size * row)
         a, a_rate, a_bias = follow(s, x, w, one, p)
         b, b_rate, b_bias = follow(s, x, w, two, at(p, 6))
         error = drift = 0.0
@@ -151,8 +128,8 @@ def bind_bodies(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint:
             turning, turning_bias = angular_velocity(s, w, roller), angular_acceleration_bias(s, w, roller)
             drift = dot(a_rate, minus(b_rate, cross(turning, b)))
             drift += dot(a, minus(minus(b_bias, cross(turning_bias, b)), cross(turning, b_rate)))
-        w[h[WORK_ERRORS] + row], w[h[WORK_DRIFTS] + row] = error, -drift
-    return OK
+        w[h[CONSTRAINED.WORK_ERRORS] + row], w[h[CONSTRAINED.WORK_DRIFTS] + row] = error, -drift
+    return OUTCOME.OK
 
 
 def follow(s: Ints, x: Floats, w: Floats, kind: Ints, p: Floats) -> tuple[Vector, Vector, Vector]:
@@ -172,9 +149,9 @@ def follow(s: Ints, x: Floats, w: Floats, kind: Ints, p: Floats) -> tuple[Vector
         # As what carries both sees it.
         while one != two:
             if one > two:
-                one = s[s[LINK_AT] + LINK_INTS * one + PARENT]
+                one = link_ints(s, one)[LINK.PARENT]
             else:
-                two = s[s[LINK_AT] + LINK_INTS * two + PARENT]
+                two = link_ints(s, two)[LINK.PARENT]
         bias = minus(bias, times(2.0, cross(angular_velocity(s, w, one), rate)))
     return arm, rate, bias
 
@@ -195,7 +172,7 @@ def lean(s: Ints, w: Floats, kind: Ints, p: Floats, on: Vector, row: Floats) -> 
 def add_force(s: Ints, w: Floats, link: int, point: Vector, force: Vector, row: Floats) -> None:
     """Add what a force at a point of ground on a link does to the coordinates."""
     if link >= 0:
-        arm = minus(point, vector(w, s[WORK_LINK] + LINK_WORK * link + ORIGIN))
+        arm = minus(point, vector(link_work(s, w, link), LINK_WORK.ORIGIN))
         add_wrench(s, w, link, cross(arm, force), force, row)
 
 
@@ -204,8 +181,8 @@ def add_wrench(s: Ints, w: Floats, link: int, torque: Vector, force: Vector, row
     if link < 0:
         return
     # Every link has a degree of freedom of its own.
-    freedom = s[s[LINK_AT] + LINK_INTS * link + END_FREEDOM] - 1
+    freedom = link_ints(s, link)[LINK.END_DOF] - 1
     while freedom >= 0:
-        column = s[WORK_COLUMN] + 6 * freedom
+        column = s[MODEL.WORK_COLUMN] + 6 * freedom
         row[freedom] += dot(torque, vector(w, column)) + dot(force, vector(w, column + 3))
-        freedom = s[s[FREEDOM_AT] + FREEDOM_INTS * freedom + ABOVE]
+        freedom = s[s[MODEL.DOF_AT] + DOF.SIZE * freedom + DOF.ABOVE]

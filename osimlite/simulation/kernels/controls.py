@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.simulation.kernels.functions import value_at
-from osimlite.simulation.kernels.layout import NUMBERS, OK, OWN, RECORD, TIME
+from osimlite.simulation.kernels.layout import ITEM, OUTCOME, WORK
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 
 
@@ -14,17 +14,17 @@ def set_controls(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int)
     are up to it, and the places of the functions' tables among the numbers.
     """
     i = at(s, item)
-    count, numbers, values = i[OWN], at(x, i[NUMBERS]), at(w, i[RECORD])
-    ends, tables = at(i, OWN + 1), at(i, OWN + 1 + count)
+    count, numbers, values = i[ITEM.OWN], at(x, i[ITEM.NUMBERS]), at(w, i[ITEM.RECORD])
+    ends, tables = at(i, ITEM.OWN + 1), at(i, ITEM.OWN + 1 + count)
     place = 0
     for control in range(count):
         total = 0.0
         while place < ends[control]:
-            value, _, _ = value_at(at(numbers, tables[place]), w[TIME])
+            value, _, _ = value_at(at(numbers, tables[place]), w[WORK.TIME])
             total += value
             place += 1
         values[control] = total
-    return OK
+    return OUTCOME.OK
 
 
 def with_reflex(w: Floats, place: int, gain: float, rate: float) -> float:

@@ -10,55 +10,21 @@ from __future__ import annotations
 
 from osimlite.forces.vectors import ZERO, Vector, along, cross, dot, minus, plus, put, times, turned, vector
 from osimlite.simulation.kernels.layout import (
-    ABOVE,
-    ACCELERATION,
-    ACCELERATION_STAGE,
     CHAIN,
-    CHAIN_DYNAMICS,
     CONSTRAINED,
-    CONSTRAINED_DYNAMICS,
     CONTACT_WORK,
-    CONTACTS,
-    DEPTH,
-    DEPTH_OF,
-    END_FREEDOM,
-    EQUILIBRIA,
-    EQUILIBRIUM_AT,
+    DOF,
     EQUILIBRIUM_INTS,
-    FIRST_FREEDOM,
-    FORCE_STAGE,
-    FREEDOM_AT,
-    FREEDOM_INTS,
-    FREEDOMS,
-    INERTIA,
     INERTIA_AT,
-    ITEM_AT,
-    ITEMS,
-    LAW,
-    LAWS,
-    LINK_AT,
-    LINK_INTS,
+    ITEM,
+    LINK,
     LINK_WORK,
-    LINKS,
-    OK,
-    ORIGIN,
-    PARENT,
-    POSITION,
-    POSITION_STAGE,
-    ROTATION,
-    ROW,
-    SINGULAR_MASS,
-    STATE_SIZE,
-    UNSOLVED,
-    VELOCITY,
-    VELOCITY_STAGE,
-    WORK_COLUMN,
-    WORK_CONTACT,
-    WORK_LINK,
-    WORK_PIVOT,
-    WRENCH,
+    MODEL,
+    OUTCOME,
+    STAGE,
 )
 from osimlite.simulation.kernels.motion import move, place
+from osimlite.simulation.kernels.parts import link_ints, link_work
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
 SMALLEST_PIVOT = 1e-13
@@ -73,31 +39,31 @@ def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) ->
         OK or what went wrong; with SINGULAR_MASS, f[0] is the degree of freedom that moves no mass.
     """
     place(s, x, w, y, f)
-    if stage == POSITION_STAGE:
-        return OK
+    if stage == STAGE.POSITION:
+        return OUTCOME.OK
     status = move(s, x, w, y, f)
-    if status != OK or stage == VELOCITY_STAGE:
+    if status != OUTCOME.OK or stage == STAGE.VELOCITY:
         return status
-    right = at(f, s[FREEDOMS])
-    if stage == FORCE_STAGE or s[CHAIN] > 0:
+    right = at(f, s[MODEL.DOFS])
+    if stage == STAGE.FORCE or s[MODEL.CHAIN] > 0:
         clear_wrenches(s, w)
         status = apply_forces(s, x, w, y, f)
         generalized_forces(s, w, right)
-        if stage == ACCELERATION_STAGE and status == OK:
-            status = call(s[LAWS + s[s[CHAIN] + CHAIN_DYNAMICS]], s, x, w, y, f, 0)
+        if stage == STAGE.ACCELERATION and status == OUTCOME.OK:
+            status = call(s[MODEL.LAWS + s[s[MODEL.CHAIN] + CHAIN.DYNAMICS]], s, x, w, y, f, 0)
     else:
         spatial_inertias_and_bias(s, x, w)
         status = apply_forces(s, x, w, y, f)
         composite_rigid_body(s, w, right)
-    if stage == FORCE_STAGE or status != OK:
+    if stage == STAGE.FORCE or status != OUTCOME.OK:
         return status
-    if s[CONSTRAINED] > 0:
-        return call(s[LAWS + s[s[CONSTRAINED] + CONSTRAINED_DYNAMICS]], s, x, w, y, f, 0)
+    if s[MODEL.CONSTRAINED] > 0:
+        return call(s[MODEL.LAWS + s[s[MODEL.CONSTRAINED] + CONSTRAINED.DYNAMICS]], s, x, w, y, f, 0)
     singular = solve(s, w, right)
     if singular >= 0:
         f[0] = singular
-        return SINGULAR_MASS
-    return OK
+        return OUTCOME.SINGULAR_MASS
+    return OUTCOME.OK
 
 
 def inverse(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> int:
@@ -116,14 +82,14 @@ def inverse(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) ->
     """
     place(s, x, w, y, f)
     status = move(s, x, w, y, f)
-    if status != OK:
+    if status != OUTCOME.OK:
         return status
-    right = at(f, s[FREEDOMS])
+    right = at(f, s[MODEL.DOFS])
     accelerate(s, w, right)
     spatial_inertias_and_bias(s, x, w)
     status = apply_forces(s, x, w, y, f)
     generalized_forces(s, w, right)
-    for freedom in range(s[FREEDOMS]):
+    for freedom in range(s[MODEL.DOFS]):
         right[freedom] = -right[freedom]
     return status
 
@@ -134,13 +100,13 @@ def equilibrate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int)
     Returns:
         OK, or what went wrong; with UNSOLVED, f[0] is the number of the first that has no equilibrium.
     """
-    status = call(s[LAWS], s, x, w, y, f, stage)
-    if status != OK:
+    status = call(s[MODEL.LAWS], s, x, w, y, f, stage)
+    if status != OUTCOME.OK:
         return status
-    for k in range(s[EQUILIBRIA] - 1, -1, -1):
-        j = at(s, s[EQUILIBRIUM_AT] + EQUILIBRIUM_INTS * k)
-        if call(j[0], s, x, w, y, f, j[1]) != OK:
-            status, f[0] = UNSOLVED, k
+    for k in range(s[MODEL.EQUILIBRIA] - 1, -1, -1):
+        j = at(s, s[MODEL.EQUILIBRIUM_AT] + EQUILIBRIUM_INTS * k)
+        if call(j[0], s, x, w, y, f, j[1]) != OUTCOME.OK:
+            status, f[0] = OUTCOME.UNSOLVED, k
     return status
 
 
@@ -162,10 +128,10 @@ def momentum(i: Floats, spin: Vector, velocity: Vector) -> tuple[Vector, Vector]
 
 def spatial_inertias_and_bias(s: Ints, x: Floats, w: Floats) -> None:
     """Inertias of the links, and the wrenches that are missing for their accelerations without udot."""
-    for link in range(s[LINKS]):
-        b, here = at(x, INERTIA_AT + 10 * link), at(w, s[WORK_LINK] + LINK_WORK * link)
-        r, i, m = at(here, ROTATION), at(here, INERTIA), b[0]
-        center = plus(minus(vector(here, POSITION), vector(here, ORIGIN)), turned(r, vector(b, 1)))
+    for link in range(s[MODEL.LINKS]):
+        b, here = at(x, INERTIA_AT + 10 * link), link_work(s, w, link)
+        r, i, m = at(here, LINK_WORK.ROTATION), at(here, LINK_WORK.INERTIA), b[0]
+        center = plus(minus(vector(here, LINK_WORK.POSITION), vector(here, LINK_WORK.ORIGIN)), turned(r, vector(b, 1)))
         cx, cy, cz = center
         mx, my, mz = times(m, center)
         one, two, three = vector(r, 0), vector(r, 3), vector(r, 6)
@@ -178,37 +144,37 @@ def spatial_inertias_and_bias(s: Ints, x: Floats, w: Floats) -> None:
         i[7] = dot(first, two) - mx * cy
         i[8] = dot(first, three) - mx * cz
         i[9] = dot(second, three) - my * cz
-        spin, velocity = vector(here, VELOCITY), vector(here, VELOCITY + 3)
+        spin, velocity = vector(here, LINK_WORK.VELOCITY), vector(here, LINK_WORK.VELOCITY + 3)
         angular, linear = momentum(i, spin, velocity)
-        torque, force = momentum(i, vector(here, ACCELERATION), vector(here, ACCELERATION + 3))
+        torque, force = momentum(i, vector(here, LINK_WORK.ACCELERATION), vector(here, LINK_WORK.ACCELERATION + 3))
         torque = plus(torque, plus(cross(spin, angular), cross(velocity, linear)))
-        put(here, WRENCH, times(-1.0, torque))
-        put(here, WRENCH + 3, times(-1.0, plus(force, cross(spin, linear))))
+        put(here, LINK_WORK.WRENCH, times(-1.0, torque))
+        put(here, LINK_WORK.WRENCH + 3, times(-1.0, plus(force, cross(spin, linear))))
 
 
 def accelerate(s: Ints, w: Floats, udot: Floats) -> None:
     """Add what udot gives to the accelerations of the links, outwards from ground."""
-    columns = at(w, s[WORK_COLUMN])
-    for link in range(s[LINKS]):
-        j, here = at(s, s[LINK_AT] + LINK_INTS * link), at(w, s[WORK_LINK] + LINK_WORK * link)
+    columns = at(w, s[MODEL.WORK_COLUMN])
+    for link in range(s[MODEL.LINKS]):
+        j, here = link_ints(s, link), link_work(s, w, link)
         # The wrench is not needed yet; its place has what the links before add.
         turn, shift = ZERO, ZERO
-        if j[PARENT] >= 0:
-            above = at(w, s[WORK_LINK] + LINK_WORK * j[PARENT] + WRENCH)
+        if j[LINK.PARENT] >= 0:
+            above = at(link_work(s, w, j[LINK.PARENT]), LINK_WORK.WRENCH)
             turn, shift = vector(above, 0), vector(above, 3)
-        for freedom in range(j[FIRST_FREEDOM], j[END_FREEDOM]):
+        for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
             c = at(columns, 6 * freedom)
             turn, shift = along(turn, udot[freedom], vector(c, 0)), along(shift, udot[freedom], vector(c, 3))
-        put(here, WRENCH, turn)
-        put(here, WRENCH + 3, shift)
-        put(here, ACCELERATION, plus(vector(here, ACCELERATION), turn))
-        put(here, ACCELERATION + 3, plus(vector(here, ACCELERATION + 3), shift))
+        put(here, LINK_WORK.WRENCH, turn)
+        put(here, LINK_WORK.WRENCH + 3, shift)
+        put(here, LINK_WORK.ACCELERATION, plus(vector(here, LINK_WORK.ACCELERATION), turn))
+        put(here, LINK_WORK.ACCELERATION + 3, plus(vector(here, LINK_WORK.ACCELERATION + 3), shift))
 
 
 def clear_wrenches(s: Ints, w: Floats) -> None:
     """No wrench on any link."""
-    for link in range(s[LINKS]):
-        load = at(w, s[WORK_LINK] + LINK_WORK * link + WRENCH)
+    for link in range(s[MODEL.LINKS]):
+        load = at(link_work(s, w, link), LINK_WORK.WRENCH)
         for k in range(6):
             load[k] = 0.0
 
@@ -219,54 +185,57 @@ def apply_forces(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
     Returns:
         OK, or what the kernel of an item says; then f[0] is the number of the item.
     """
-    for number in range(s[FREEDOMS], s[STATE_SIZE]):
+    for number in range(s[MODEL.DOFS], s[MODEL.STATE_SIZE]):
         f[number] = 0.0
-    for number in range(s[CONTACTS]):
-        result = at(w, s[WORK_CONTACT] + CONTACT_WORK * number)
-        result[0], result[1], result[2], result[DEPTH_OF] = 0.0, 0.0, 0.0, 0.0
-    for number in range(s[ITEMS]):
-        item = s[s[ITEM_AT] + number]
-        status = call(s[item + LAW], s, x, w, y, f, item)
-        if status != OK:
+    for number in range(s[MODEL.CONTACTS]):
+        result = at(w, s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * number)
+        result[0], result[1], result[2], result[CONTACT_WORK.DEPTH] = 0.0, 0.0, 0.0, 0.0
+    for number in range(s[MODEL.ITEMS]):
+        item = s[s[MODEL.ITEM_AT] + number]
+        status = call(s[item + ITEM.LAW], s, x, w, y, f, item)
+        if status != OUTCOME.OK:
             f[0] = number
             return status
-    return OK
+    return OUTCOME.OK
 
 
 def generalized_forces(s: Ints, w: Floats, right: Floats) -> None:
     """The generalized forces of the wrenches, inwards from the leaves."""
-    columns = at(w, s[WORK_COLUMN])
-    for link in range(s[LINKS] - 1, -1, -1):
-        j, load = at(s, s[LINK_AT] + LINK_INTS * link), at(w, s[WORK_LINK] + LINK_WORK * link + WRENCH)
-        for freedom in range(j[FIRST_FREEDOM], j[END_FREEDOM]):
+    columns = at(w, s[MODEL.WORK_COLUMN])
+    for link in range(s[MODEL.LINKS] - 1, -1, -1):
+        j, load = (
+            link_ints(s, link),
+            at(link_work(s, w, link), LINK_WORK.WRENCH),
+        )
+        for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
             c = at(columns, 6 * freedom)
             for k in range(6):
                 right[freedom] += c[k] * load[k]
-        if j[PARENT] >= 0:
-            above = at(w, s[WORK_LINK] + LINK_WORK * j[PARENT] + WRENCH)
+        if j[LINK.PARENT] >= 0:
+            above = at(link_work(s, w, j[LINK.PARENT]), LINK_WORK.WRENCH)
             for k in range(6):
                 above[k] += load[k]
 
 
 def composite_rigid_body(s: Ints, w: Floats, right: Floats) -> None:
     """Mass matrix, and the generalized forces, inwards from the leaves."""
-    freedoms, columns = at(s, s[FREEDOM_AT]), at(w, s[WORK_COLUMN])
-    for link in range(s[LINKS] - 1, -1, -1):
-        j, here = at(s, s[LINK_AT] + LINK_INTS * link), at(w, s[WORK_LINK] + LINK_WORK * link)
-        i, load = at(here, INERTIA), at(here, WRENCH)
-        for freedom in range(j[FIRST_FREEDOM], j[END_FREEDOM]):
+    freedoms, columns = at(s, s[MODEL.DOF_AT]), at(w, s[MODEL.WORK_COLUMN])
+    for link in range(s[MODEL.LINKS] - 1, -1, -1):
+        j, here = link_ints(s, link), link_work(s, w, link)
+        i, load = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH)
+        for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
             c = at(columns, 6 * freedom)
             turn, shift = vector(c, 0), vector(c, 3)
             right[freedom] += dot(turn, vector(load, 0)) + dot(shift, vector(load, 3))
             angular, linear = momentum(i, turn, shift)
-            row, k, place = at(w, freedoms[FREEDOM_INTS * freedom + ROW]), freedom, 0
+            row, k, place = at(w, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
             while k >= 0:
                 c = at(columns, 6 * k)
                 row[place] = dot(vector(c, 0), angular) + dot(vector(c, 3), linear)
-                k = freedoms[FREEDOM_INTS * k + ABOVE]
+                k = freedoms[DOF.SIZE * k + DOF.ABOVE]
                 place += 1
-        if j[PARENT] >= 0:
-            above = at(w, s[WORK_LINK] + LINK_WORK * j[PARENT] + INERTIA)
+        if j[LINK.PARENT] >= 0:
+            above = at(link_work(s, w, j[LINK.PARENT]), LINK_WORK.INERTIA)
             # The wrench stands behind the inertia.
             for k in range(16):
                 above[k] += i[k]
@@ -274,30 +243,30 @@ def composite_rigid_body(s: Ints, w: Floats, right: Floats) -> None:
 
 def solve(s: Ints, w: Floats, right: Floats) -> int:
     """Solve for the accelerations in place; returns the degree of freedom that moves no mass, or -1."""
-    size, freedoms, pivots = s[FREEDOMS], at(s, s[FREEDOM_AT]), at(w, s[WORK_PIVOT])
+    size, freedoms, pivots = s[MODEL.DOFS], at(s, s[MODEL.DOF_AT]), at(w, s[MODEL.WORK_PIVOT])
     for k in range(size):
-        pivots[k] = w[freedoms[FREEDOM_INTS * k + ROW]]
+        pivots[k] = w[freedoms[DOF.SIZE * k + DOF.ROW]]
     for k in range(size - 1, -1, -1):
-        j = at(freedoms, FREEDOM_INTS * k)
-        row, depth, i = at(w, j[ROW]), j[DEPTH], j[ABOVE]
+        j = at(freedoms, DOF.SIZE * k)
+        row, depth, i = at(w, j[DOF.ROW]), j[DOF.DEPTH], j[DOF.ABOVE]
         pivot = row[0]
         if not pivot > SMALLEST_PIVOT * pivots[k]:
             return k
         inverse, load = 1.0 / pivot, right[k]
         for m in range(1, depth + 1):
             a = row[m] * inverse
-            target = at(w, freedoms[FREEDOM_INTS * i + ROW])
+            target = at(w, freedoms[DOF.SIZE * i + DOF.ROW])
             for t in range(depth + 1 - m):
                 target[t] -= a * row[m + t]
             right[i] -= a * load
             row[m] = a
-            i = freedoms[FREEDOM_INTS * i + ABOVE]
+            i = freedoms[DOF.SIZE * i + DOF.ABOVE]
         right[k] = load * inverse
     for k in range(size):
-        j = at(freedoms, FREEDOM_INTS * k)
-        row, i, total = at(w, j[ROW]), j[ABOVE], right[k]
-        for m in range(1, j[DEPTH] + 1):
+        j = at(freedoms, DOF.SIZE * k)
+        row, i, total = at(w, j[DOF.ROW]), j[DOF.ABOVE], right[k]
+        for m in range(1, j[DOF.DEPTH] + 1):
             total -= row[m] * right[i]
-            i = freedoms[FREEDOM_INTS * i + ABOVE]
+            i = freedoms[DOF.SIZE * i + DOF.ABOVE]
         right[k] = total
     return -1

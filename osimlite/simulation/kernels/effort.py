@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from osimlite.simulation.kernels.layout import OK
+from osimlite.simulation.kernels.layout import OUTCOME
 from osimlite.simulation.kernels.least_squares import cholesky, substitute
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 
@@ -78,7 +78,7 @@ def least_effort(sizes: Ints, numbers: Floats, given: Floats, found: Floats, roo
         for k in range(m):
             x[n + k] /= scales[k]
         x[n + m] = 1.0 if is_solved else 0.0
-    return OK
+    return OUTCOME.OK
 
 
 def scale(sizes: Ints, columns: Floats, scales: Floats) -> None:

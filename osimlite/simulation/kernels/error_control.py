@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf, isfinite, sqrt
 
 from osimlite.simulation.integrators import weight
-from osimlite.simulation.kernels.layout import CONSTRAINED, FREEDOMS, LAWS, OK, PROJECT, SCRATCH, STATE_SIZE, TIME
+from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, OUTCOME, WORK
 from osimlite.simulation.kernels.method import ACCEPTED, COUNTED_Q, COUNTED_U
 from osimlite.simulation.kernels.pointers import Floats, Ints, call
 
@@ -14,8 +14,10 @@ def projected(
     s: Ints, x: Floats, w: Floats, t: float, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float
 ) -> bool:
     """Move a state to where the constraints hold, and tell whether they do; see `projection.project`."""
-    w[TIME], w[SCRATCH], w[SCRATCH + 1] = t, tolerance, limit
-    return call(s[LAWS + s[s[CONSTRAINED] + PROJECT]], s, x, w, y, off, has_errors) == OK
+    w[WORK.TIME], w[WORK.SCRATCH], w[WORK.SCRATCH + 1] = t, tolerance, limit
+    return (
+        call(s[MODEL.LAWS + s[s[MODEL.CONSTRAINED] + CONSTRAINED.PROJECT]], s, x, w, y, off, has_errors) == OUTCOME.OK
+    )
 
 
 def step_error(
@@ -24,10 +26,10 @@ def step_error(
     """The norm of the errors of a step, once its end was moved to where the constraints hold; see `error_norm`."""
     error = error_norm(s, y0, errors, h, is_strict)
     # As in Simbody: what half a step would not mend, neither does the projection.
-    if s[CONSTRAINED] == 0 or not error <= 16.0 * h[ACCEPTED]:
+    if s[MODEL.CONSTRAINED] == 0 or not error <= 16.0 * h[ACCEPTED]:
         return error
     tolerance = h[ACCEPTED] / 10.0
-    for k in range(s[STATE_SIZE]):
+    for k in range(s[MODEL.STATE_SIZE]):
         errors[k] = abs(errors[k])
     if not projected(s, x, w, t1, y1, errors, 1, tolerance, max(2.0 * tolerance, sqrt(tolerance))):
         return inf
@@ -47,7 +49,7 @@ def error_norm(s: Ints, y0: Floats, errors: Floats, h: Floats, is_strict: int) -
         h: place of the method.
         is_strict: whether the largest error of z counts.
     """
-    n, size = s[FREEDOMS], s[STATE_SIZE]
+    n, size = s[MODEL.DOFS], s[MODEL.STATE_SIZE]
     of_q = of_u = of_z = 0.0
     for k in range(n):
         of_q += errors[k] * errors[k]

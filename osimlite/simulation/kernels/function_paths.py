@@ -7,19 +7,19 @@ which the derivatives by the arguments follow.
 from __future__ import annotations
 
 from osimlite.simulation.kernels.functions import value_at
-from osimlite.simulation.kernels.layout import FREEDOMS, LAW, NUMBERS, OK, OWN, RECORD
+from osimlite.simulation.kernels.layout import ITEM, MODEL, OUTCOME
 from osimlite.simulation.kernels.paths import LENGTH, SPEED, TENSION
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.programs import compute
 
-COUNT, LENGTH_BACK, SPEED_BACK, COORDINATES = OWN + 1, OWN + 2, OWN + 3, OWN + 4
+COUNT, LENGTH_BACK, SPEED_BACK, COORDINATES = ITEM.OWN + 1, ITEM.OWN + 2, ITEM.OWN + 3, ITEM.OWN + 4
 """Integers of a path: how many coordinates it depends on; how far before it the items of length and speed stand, 0 if
 the speed follows from the moment arms; the degrees of freedom of the coordinates (-1 for a locked one), and after them
 how far before it the items of the moment arms stand, 0 for one that is the derivative of the length times -1."""
 ARMS = 3
 """The rest of its record: the moment arms."""
 
-SIZE, ORDER, ARGUMENTS = OWN, OWN + 1, OWN + 2
+SIZE, ORDER, ARGUMENTS = ITEM.OWN, ITEM.OWN + 1, ITEM.OWN + 2
 """Integers of a function: how many arguments it has; the order of a polynomial, or how many programs a formula has; the
 places of the arguments in a state (-1 for what does not change). Its numbers begin with the arguments that do not."""
 DERIVATIVES = 1
@@ -27,7 +27,7 @@ DERIVATIVES = 1
 
 def function_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Length and speed of a FunctionBasedPath, and its moment arms."""
-    i, result = at(s, item), at(w, s[item + RECORD])
+    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
     count, coordinates = i[COUNT], at(i, COORDINATES)
     length = called(s, x, w, y, f, item - i[LENGTH_BACK])
     speed = 0.0
@@ -40,31 +40,31 @@ def function_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int
     if i[SPEED_BACK] > 0:
         speed = called(s, x, w, y, f, item - i[SPEED_BACK])[0]
     result[LENGTH], result[SPEED] = length[0], speed
-    return OK
+    return OUTCOME.OK
 
 
 def called(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> Floats:
     """The record of a function after it was computed."""
-    call(s[item + LAW], s, x, w, y, f, item)
-    return at(w, s[item + RECORD])
+    call(s[item + ITEM.LAW], s, x, w, y, f, item)
+    return at(w, s[item + ITEM.RECORD])
 
 
 def pull_coordinates(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Apply the tension of a path by its moment arms."""
-    i, result = at(s, item), at(w, s[item + RECORD])
+    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
     for k in range(i[COUNT]):
         freedom = i[COORDINATES + k]
         if freedom >= 0:
-            f[s[FREEDOMS] + freedom] += result[ARMS + k] * result[TENSION]
-    return OK
+            f[s[MODEL.DOFS] + freedom] += result[ARMS + k] * result[TENSION]
+    return OUTCOME.OK
 
 
 def function_of_one(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Of a function of one argument, by its table."""
-    i, p, result = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    i, p, result = at(s, item), at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
     place = i[ARGUMENTS]
     result[0], result[DERIVATIVES], _ = value_at(at(p, 1), y[place] if place >= 0 else p[0])
-    return OK
+    return OUTCOME.OK
 
 
 def polynomial(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -73,7 +73,7 @@ def polynomial(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
     The terms are sorted by the power of the first argument, then of the next. In the record stand, after the
     derivatives, the powers of each argument, which powers the term has, and its factors up to each argument.
     """
-    i, p, result = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    i, p, result = at(s, item), at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
     size, width = i[SIZE], i[ORDER] + 1
     powers = at(result, DERIVATIVES + size)
     exponents, factors = at(powers, size * width), at(powers, size * width + size)
@@ -109,7 +109,7 @@ def polynomial(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
         total += 1
         term += 1
     result[0] = value
-    return OK
+    return OUTCOME.OK
 
 
 def formula(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -118,7 +118,7 @@ def formula(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> i
     After its arguments stand the programs of the value and of the derivatives, if these are asked for: the count of
     steps, the place of the constants, and the steps. The registers are in the record.
     """
-    i, p, result = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    i, p, result = at(s, item), at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
     size = i[SIZE]
     program, registers = at(i, ARGUMENTS + size), at(result, DERIVATIVES + size)
     for number in range(i[ORDER]):
@@ -127,4 +127,4 @@ def formula(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> i
             registers[k] = y[place] if place >= 0 else p[k]
         result[number] = compute(at(program, 2), program[0], at(p, program[1]), registers, size)
         program = at(program, 2 + 3 * program[0])
-    return OK
+    return OUTCOME.OK

@@ -10,21 +10,8 @@ from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody import functions as f
 from osimlite.multibody.arc import COSINE_TERMS, SINE_TERMS, ArcPoint
 from osimlite.multibody.smoothing_spline import PiecewisePolynomial
-from osimlite.simulation.kernels.layout import (
-    AMOUNT,
-    ARGUMENT_COUNT,
-    ARGUMENTS,
-    CURVATURE,
-    EXTRA,
-    FREEDOMS,
-    GRADIENT,
-    OK,
-    OPERATION_AT,
-    OPERATION_INTS,
-    OPERATION_WORK,
-    RATE,
-    WORK_OPERATION,
-)
+from osimlite.simulation.kernels.layout import MODEL, OPERATION, OPERATION_WORK, OUTCOME
+from osimlite.simulation.kernels.parts import operation_ints, operation_work
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 
 PIECES, SINE, STEP, PIECES_OF_OPENSIM, MONOMIALS, MONOMIALS_OF_OPENSIM, ARC = 0, 1, 2, 3, 4, 5, 6
@@ -153,21 +140,40 @@ def value_at(table: Floats, z: float) -> tuple[float, float, float]:
 
 def amount_by_one(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Amount of an operation by a function of one coordinate, with its derivatives."""
-    j, a = at(s, s[OPERATION_AT] + OPERATION_INTS * operation), at(w, s[WORK_OPERATION] + OPERATION_WORK * operation)
-    freedom = s[j[ARGUMENTS]]
-    value, slope, curvature = value_at(at(x, j[EXTRA] + 1), y[freedom] if freedom >= 0 else x[j[EXTRA]])
-    speed = y[s[FREEDOMS] + freedom] if freedom >= 0 else 0.0
-    a[AMOUNT], a[RATE], a[CURVATURE] = value, slope * speed, curvature * speed * speed
-    w[j[GRADIENT]] = slope
-    return OK
+    j, a = (
+        operation_ints(s, operation),
+        operation_work(s, w, operation),
+    )
+    freedom = s[j[OPERATION.ARGUMENTS]]
+    value, slope, curvature = value_at(
+        at(x, j[OPERATION.EXTRA] + 1), y[freedom] if freedom >= 0 else x[j[OPERATION.EXTRA]]
+    )
+    speed = y[s[MODEL.DOFS] + freedom] if freedom >= 0 else 0.0
+    a[OPERATION_WORK.AMOUNT], a[OPERATION_WORK.RATE], a[OPERATION_WORK.CURVATURE] = (
+        value,
+        slope * speed,
+        curvature * speed * speed,
+    )
+    w[j[OPERATION.GRADIENT]] = slope
+    return OUTCOME.OK
 
 
 def amount_by_several(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Amount of an operation by a polynomial of several coordinates, with its derivatives."""
-    j, a = at(s, s[OPERATION_AT] + OPERATION_INTS * operation), at(w, s[WORK_OPERATION] + OPERATION_WORK * operation)
-    size, arguments, constants, gradient = j[ARGUMENT_COUNT], at(s, j[ARGUMENTS]), at(x, j[EXTRA]), at(w, j[GRADIENT])
-    a[AMOUNT], a[RATE], a[CURVATURE] = several_at(size, arguments, constants, y, at(y, s[FREEDOMS]), gradient)
-    return OK
+    j, a = (
+        operation_ints(s, operation),
+        operation_work(s, w, operation),
+    )
+    size, arguments, constants, gradient = (
+        j[OPERATION.ARGUMENT_COUNT],
+        at(s, j[OPERATION.ARGUMENTS]),
+        at(x, j[OPERATION.EXTRA]),
+        at(w, j[OPERATION.GRADIENT]),
+    )
+    a[OPERATION_WORK.AMOUNT], a[OPERATION_WORK.RATE], a[OPERATION_WORK.CURVATURE] = several_at(
+        size, arguments, constants, y, at(y, s[MODEL.DOFS]), gradient
+    )
+    return OUTCOME.OK
 
 
 def several_at(

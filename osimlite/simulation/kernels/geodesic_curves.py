@@ -23,7 +23,7 @@ from osimlite.simulation.kernels.cable_surfaces import ALONG as ALONG_GEODESIC
 from osimlite.simulation.kernels.cable_surfaces import ALONG_BENDS, ARC, END, POINT, START, STEP, shoot
 from osimlite.simulation.kernels.geodesic_paths import CHAIN, PLACES, POSE_NUMBERS, POSES, SEARCH, WRAP_INTS
 from osimlite.simulation.kernels.geodesic_starts import SURFACE
-from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.layout import ITEM
 from osimlite.simulation.kernels.path_wraps import in_ground, in_surface
 from osimlite.simulation.kernels.paths import ALONG, COUNT, NODE_INTS, NODE_WORK, NODES_AT, ORDER, PLACE, POINTS, WRAPS
 from osimlite.simulation.kernels.paths import SURFACE as SURFACE_LENGTH
@@ -33,7 +33,7 @@ from osimlite.simulation.kernels.wrap_curves import pieces
 
 def trace_geodesics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Write all corners of a path that was measured into f, in ground; returns how many there are."""
-    i, p, result = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    i, p, result = at(s, item), at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
     points, wraps = i[POINTS], at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * i[WRAPS]))
     order, work = at(result, ORDER), at(result, ORDER + points + 2 * i[WRAPS])
     slots = at(wraps, WRAP_INTS * i[WRAPS])
@@ -59,7 +59,7 @@ def trace_geodesics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: i
 
 def trace_cable(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """The same of a cable."""
-    i, p, result = at(s, item), at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    i, p, result = at(s, item), at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
     count = 0
     for k in range(i[CABLE_COUNT]):
         element = at(i, ELEMENTS + ELEMENT_INTS * k)

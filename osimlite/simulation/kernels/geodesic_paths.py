@@ -47,7 +47,7 @@ from osimlite.simulation.kernels.geodesic_starts import (
     start,
     ways_past,
 )
-from osimlite.simulation.kernels.layout import NUMBERS, OK, RECORD
+from osimlite.simulation.kernels.layout import ITEM, OUTCOME
 from osimlite.simulation.kernels.path_wraps import in_surface
 from osimlite.simulation.kernels.paths import (
     AT,
@@ -113,8 +113,8 @@ def slots_and_room(most: int, wraps: int, room: int) -> tuple[list[int], int]:
 def geodesic_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Length and speed of a path with wraps."""
     place_points(s, x, w, y, item)
-    i, p = at(s, item), at(x, s[item + NUMBERS])
-    result, points, size = at(w, i[RECORD]), i[POINTS], i[POINTS] + 2 * i[WRAPS]
+    i, p = at(s, item), at(x, s[item + ITEM.NUMBERS])
+    result, points, size = at(w, i[ITEM.RECORD]), i[POINTS], i[POINTS] + 2 * i[WRAPS]
     order, work = at(result, ORDER), at(result, ORDER + size)
     slots = at(i, NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS])
     place_surfaces(s, w, i, p)
@@ -136,13 +136,13 @@ def geodesic_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int
             one[IS_KEPT] = two[IS_KEPT] = 0.0
             order[k + 2 * number + 1], order[k + 2 * number + 2] = node, node + 1
     measure_points(s, w, y, item)
-    return OK
+    return OUTCOME.OK
 
 
 def place_surfaces(s: Ints, w: Floats, i: Ints, p: Floats) -> None:
     """Where the surfaces are in ground."""
     size = i[POINTS] + 2 * i[WRAPS]
-    poses = at(w, i[RECORD] + i[NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS] + POSES])
+    poses = at(w, i[ITEM.RECORD] + i[NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS] + POSES])
     for number in range(i[WRAPS]):
         node, pose = at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * number)), at(poses, POSE_NUMBERS * number)
         n = at(p, node[AT])

@@ -14,136 +14,201 @@ its tree, so that no digits are lost far away from ground's own origin.
 
 from __future__ import annotations
 
-# Integers: a head with counts and places, then records.
-LINKS, FREEDOMS, ITEMS, CONTACTS = 0, 1, 2, 3
-"""How many there are: links, degrees of freedom, items (forces and the like), contacts."""
-LINK_AT, OPERATION_AT, FREEDOM_AT, ITEM_AT = 4, 5, 6, 7
-"""Places of the records in s; at ITEM_AT are the places of the items' records."""
-SUMMED, SUMMED_AT = 8, 9
-"""Count and place of a list of the degrees of freedom whose columns are sums of several."""
-FIXED_AT = 10
-"""Place in x of the fixed transforms of the operations, by rows and then the translation, and of axes of slides
-(K, FIXED_NUMBERS)."""
-FIXED_NUMBERS = 15
-WORK_LINK, WORK_OPERATION, WORK_COLUMN, WORK_PIVOT, WORK_CONTACT, WORK_STATE = 11, 12, 13, 14, 15, 16
-"""Offsets in the work vector w of what is computed for links, operations, columns, pivots, contacts and states."""
-WORK_SIZE = 17
-"""Length of w."""
-CONTACT_AT = 18
-"""Where the places of the records of the pairs stand, by contact."""
-CONSTRAINED = 19
-"""Place of the record of all constraints, 0 if there are none."""
-STATE_SIZE = 20
-"""Length of a state: values, speeds, and auxiliary states."""
-CONTROLS, WORK_CONTROL = 21, 22
-"""Place of the record of the controls, 0 if there are none; place in w of the controls."""
-EQUILIBRIA, EQUILIBRIUM_AT = 23, 24
-"""Count and place of what can be brought into equilibrium: for each the address of the kernel that does it, and the
-place of its item."""
-EQUILIBRIUM_INTS = 2
-CHAIN = 25
-"""Place of the record of the joints of another program that gives the mass matrix and the bias, 0 if there is none."""
-RESPONSES, RESPONSE_AT = 26, 27
-"""Count and place of the forces that push along one displacement: for each the address of the kernel that finds their
-derivatives, the place of its item, the place among the item's integers of the first of those that say where its states
-are, their count, and -1 if it pulls against the displacement, else 1."""
-RESPONSE_INTS = 5
-LAWS = 28
-"""From here on the addresses of the laws, by their number."""
 
-LINK_INTS = 5
-PARENT, FIRST_OPERATION, END_OPERATION, FIRST_FREEDOM, END_FREEDOM = 0, 1, 2, 3, 4
-"""Integers of a link: its parent (-1 is ground), the ranges of its operations and of its degrees of freedom."""
+class Record(type):
+    """The metaclass of records: their attributes are offsets of fields, or numbers that stand for something.
 
-OPERATION_INTS = 8
-MOTION, BEFORE, FREEDOM, FUNCTION, ARGUMENTS, ARGUMENT_COUNT, EXTRA, GRADIENT = 0, 1, 2, 3, 4, 5, 6, 7
-"""Integers of an operation, one motion of a joint: its motion, the kind of its fixed transform, the degree of freedom
-that is its amount or -1, the law that gives the amount otherwise or the motion of a ball; place and number of the
-arguments in s (degrees of freedom, -1 for a number that does not change); place in x of the radii, or of the values of
-such arguments and the table of the function after them; place in w of the gradient."""
+    Compiled kernels take one as they take a module, so that a field is a constant there.
+    """
 
-ALONE, TOGETHER = -1, -2
-"""In the place of the law: the column of the degree of freedom comes from this operation only, or from several."""
 
-FREEDOM_INTS = 3
-ABOVE, ROW, DEPTH = 0, 1, 2
-"""Of a degree of freedom: the next one on the way to ground or -1, place in w of its row of the mass matrix, and how
-many there are on the way."""
+# Integers: a head with counts and offsets, then records.
+class MODEL(metaclass=Record):
+    """The head of s: counts, and where all else is."""
 
-LAW, NUMBERS, RECORD, FIRST_CONTACT, OWN = 0, 1, 2, 3, 4
-"""Of an item: address of its kernel, places in x and w of what it owns there, number of the first contact of its
-element, and from OWN on integers of its own. The record of the controls is like one."""
+    LINKS, DOFS, ITEMS, CONTACTS = 0, 1, 2, 3
+    """How many there are: links, degrees of freedom, items (forces and the like), contacts."""
+    LINK_AT, OPERATION_AT, DOF_AT, ITEM_AT = 4, 5, 6, 7
+    """Offsets of the records in s; at ITEM_AT are the offsets of the items' records."""
+    SUMMED, SUMMED_AT = 8, 9
+    """Count and offset of a list of the degrees of freedom whose columns are sums of several."""
+    FIXED_AT = 10
+    """Offset in x of the fixed transforms of the operations, by rows and then the translation, and of axes of slides
+    (K, FIXED_NUMBERS)."""
+    WORK_LINK, WORK_OPERATION, WORK_COLUMN, WORK_PIVOT, WORK_CONTACT, WORK_STATE = 11, 12, 13, 14, 15, 16
+    """Offsets in the work vector w of what is computed for links, operations, columns, pivots, contacts and states."""
+    WORK_SIZE = 17
+    """Length of w."""
+    CONTACT_AT = 18
+    """Where the offsets of the records of the pairs stand, by contact."""
+    CONSTRAINED = 19
+    """Offset of the record of all constraints, 0 if there are none."""
+    STATE_SIZE = 20
+    """Length of a state: values, speeds, and auxiliary states."""
+    CONTROLS, WORK_CONTROL = 21, 22
+    """Offset of the record of the controls, 0 if there are none; offset in w of the controls."""
+    EQUILIBRIA, EQUILIBRIUM_AT = 23, 24
+    """Count and offset of what can be brought into equilibrium: for each the address of the kernel that does it, and
+    the offset of its item."""
+    CHAIN = 25
+    """Offset of the record of the joints of another program that gives the mass matrix and the bias, 0 if there is
+    none."""
+    RESPONSES, RESPONSE_AT = 26, 27
+    """Count and offset of the forces that push along one displacement: for each the address of the kernel that finds
+    their derivatives, the offset of its item, the offset among the item's integers of the first of those that say where
+    its states are, their count, and -1 if it pulls against the displacement, else 1."""
+    LAWS = 28
+    """From here on the addresses of the laws, by their number."""
 
-CONSTRAINED_DYNAMICS, PROJECT, CONSTRAINTS, CONSTRAINT_AT = 0, 1, 2, 3
-EQUATIONS, POSITIONS, LOCKS, BALLS, BALL_AT, ENTRIES = 4, 5, 6, 7, 8, 9
-"""Of all constraints: the laws that find accelerations and that project states; count of the constraints, and where the
-places of their records stand; counts of the equations, of those that bind positions, and of coordinates that are just
-locked; count of the balls, and where the places of their arguments stand; count of the numbers of the mass matrix."""
-WORK_ROWS, WORK_ERRORS, WORK_RATES, WORK_DRIFTS = 10, 11, 12, 13
-"""Places in w of G (m, n), of the errors, and of what G u and G udot are to be."""
-WORK_KEPT, WORK_FACTOR, WORK_SYSTEM, WORK_TRIAL = 14, 15, 16, 17
-"""Places in w of room: for (m, n) numbers, for a factor of them, for solving, for states."""
-FACTORISE, MINIMUM_NORM = 18, 19
-"""The laws that factorise equations, and that solve them then."""
-CONSTRAINED_INTS = 20
 
-FIRST_EQUATION, END_EQUATION, END_POSITION, CONSTRAINT_OWN = 2, 3, 4, 5
-"""Of a constraint, after its law and the place of its numbers: its equations, of which those up to the second end bind
-positions, and from CONSTRAINT_OWN on integers of its own."""
+FIXED_NUMBERS, EQUILIBRIUM_INTS, RESPONSE_INTS = 15, 2, 5
+"""Sizes of a fixed transform, and of the entries of the lists at EQUILIBRIUM_AT and RESPONSE_AT."""
 
-CHAIN_DYNAMICS, SUPPLY, JOINTS, JOINT_AT = 0, 1, 2, 3
-SHARES, SHARE_AT, PRODUCTS, PRODUCT_AT, EXCESSES, EXCESS_AT = 4, 5, 6, 7, 8, 9
-"""Of the joints: the law that finds the mass matrix, the address of the kernel that asks the other program; counts and
-places of their records, of pairs of a joint and a degree of freedom that moves it, of products of two such shares, and
-of links to which the other program gives too much inertia."""
-WORK_JOINTS, WORK_SHARES, ENTRY_AT, END_ENTRY = 10, 11, 12, 13
-"""Places in w: of values, rates, accelerations without udot and forces of all joints and then the mass matrix, of the
-shares, and of the rows of our own mass matrix and their end."""
-CHAIN_INTS = 14
 
-JOINT_INTS = 4
-KIND, SOURCE, PART, FIRST_SHARE = 0, 1, 2, 3
-"""Of a joint: what it is a part of, number of that degree of freedom or operation, which part or the place in x of a
-factor, and its first share."""
-LINE, AMOUNT_OF, ANGLE, ELLIPSOID, ERROR = 0, 1, 2, 3, 4
-"""Kinds of joints: a multiple of a degree of freedom, the amount of an operation, an angle of a ball, a component of
-where its end lies on the ellipsoid, a component of the error of a drift."""
+class LINK(metaclass=Record):
+    """Integers of a link: its parent (-1 is ground), the ranges of its operations and of its degrees of freedom."""
+
+    PARENT, FIRST_OPERATION, END_OPERATION, FIRST_DOF, END_DOF, SIZE = range(6)
+
+
+class OPERATION(metaclass=Record):
+    """Integers of an operation, one motion of a joint.
+
+    Its motion, the kind of its fixed transform, the degree of freedom that is its amount or -1, the law that gives the
+    amount otherwise or the motion of a ball; offset and number of the arguments in s (degrees of freedom, -1 for a
+    number that does not change); offset in x of the radii, or of the values of such arguments and the table of the
+    function after them; offset in w of the gradient.
+    """
+
+    MOTION, BEFORE, DOF, FUNCTION, ARGUMENTS, ARGUMENT_COUNT, EXTRA, GRADIENT, SIZE = range(9)
+    ALONE, TOGETHER = -1, -2
+    """In place of the law: the column of the degree of freedom comes from this operation only, or from several."""
+
+
+class DOF(metaclass=Record):
+    """Of a degree of freedom: the next one on the way to ground or -1, offset in w of its row of the mass matrix, and
+    how many there are on the way."""
+
+    ABOVE, ROW, DEPTH, SIZE = range(4)
+
+
+class ITEM(metaclass=Record):
+    """Of an item: address of its kernel, offsets in x and w of what it owns there, number of the first contact of its
+    element, and from OWN on integers of its own. The record of the controls is like one."""
+
+    LAW, NUMBERS, RECORD, FIRST_CONTACT, OWN = range(5)
+
+
+class CONSTRAINED(metaclass=Record):
+    """Of all constraints."""
+
+    DYNAMICS, PROJECT, CONSTRAINTS, CONSTRAINT_AT = 0, 1, 2, 3
+    """The laws that find accelerations and that project states; count of the constraints, and where the offsets of
+    their records stand."""
+    EQUATIONS, POSITIONS, LOCKS, BALLS, BALL_AT, ENTRIES = 4, 5, 6, 7, 8, 9
+    """Counts of the equations, of those that bind positions, and of coordinates that are just locked; count of the
+    balls, and where the offsets of their arguments stand; count of the numbers of the mass matrix."""
+    WORK_ROWS, WORK_ERRORS, WORK_RATES, WORK_DRIFTS = 10, 11, 12, 13
+    """Offsets in w of G (m, n), of the errors, and of what G u and G udot are to be."""
+    WORK_KEPT, WORK_FACTOR, WORK_SYSTEM, WORK_TRIAL = 14, 15, 16, 17
+    """Offsets in w of scratch: for (m, n) numbers, for a factor of them, for solving, for states."""
+    FACTORISE, MINIMUM_NORM = 18, 19
+    """The laws that factorise equations, and that solve them then."""
+    SIZE = 20
+
+
+class CONSTRAINT(metaclass=Record):
+    """Of a constraint, after its law and the offset of its numbers: its equations, of which those up to the second end
+    bind positions, and from OWN on integers of its own."""
+
+    FIRST_EQUATION, END_EQUATION, END_POSITION, OWN = 2, 3, 4, 5
+
+
+class CHAIN(metaclass=Record):
+    """Of the joints of another program."""
+
+    DYNAMICS, SUPPLY, JOINTS, JOINT_AT = 0, 1, 2, 3
+    SHARES, SHARE_AT, PRODUCTS, PRODUCT_AT, EXCESSES, EXCESS_AT = 4, 5, 6, 7, 8, 9
+    """The law that finds the mass matrix, the address of the kernel that asks the other program; counts and offsets of
+    their records, of pairs of a joint and a degree of freedom that moves it, of products of two such shares, and of
+    links to which the other program gives too much inertia."""
+    WORK_JOINTS, WORK_SHARES, ENTRY_AT, END_ENTRY = 10, 11, 12, 13
+    """Offsets in w: of values, rates, accelerations without udot and forces of all joints and then the mass matrix, of
+    the shares, and of the rows of our own mass matrix and their end."""
+    SIZE = 14
+
+
+class JOINT(metaclass=Record):
+    """Of a joint: what it is a part of, number of that degree of freedom or operation, which part or the offset in x of
+    a factor, and its first share."""
+
+    KIND, SOURCE, PART, FIRST_SHARE, SIZE = range(5)
+
+
+class JOINT_KIND(metaclass=Record):
+    """A multiple of a degree of freedom, the amount of an operation, an angle of a ball, a component of where its end
+    lies on the ellipsoid, a component of the error of a drift."""
+
+    LINE, AMOUNT_OF, ANGLE, ELLIPSOID, ERROR = range(5)
+
 
 # Numbers.
 GRAVITY_AT, INERTIA_AT = 0, 3
 """Gravity in ground (3,); of each link mass, mass centre in the link, xx, yy, zz, xy, xz, yz about it (L, 10)."""
 
-# Work.
-TIME, SCRATCH = 0, 1
-"""The time, s; room for what laws hand over."""
-WORK_HEAD = 32
 
-LINK_WORK = 44
-ROTATION, POSITION, ORIGIN, VELOCITY, ACCELERATION, INERTIA, WRENCH = 0, 9, 12, 15, 21, 27, 37
-"""Of a link: rotation in ground by rows, position of its origin, origin of the spatial vectors, velocity, acceleration
-while the derivatives of all speeds are zero (upwards against gravity); inertia (mass, first moment, xx, yy, zz, xy, xz,
-yz) and wrench of it, and of all that it carries too after the evaluation."""
+class WORK(metaclass=Record):
+    """The head of w: the time (s), and room for what laws hand over."""
 
-OPERATION_WORK = 16
-AXIS, POINT, AMOUNT, RATE, CURVATURE = 0, 9, 12, 13, 14
-"""Work of an operation: the axis, or the frame by rows whose axes a ball's speeds are about; where that is; amount,
-rate and second derivative without udot, if a function gives them."""
+    TIME, SCRATCH, SIZE = 0, 1, 32
 
-CONTACT_WORK = 8
-FORCE, DEPTH_OF, RADIUS_OF = 0, 6, 7
-"""Work of a contact: force on surface 2, its point, depth and radius of the law; force and depth are 0 without
-contact."""
+
+class LINK_WORK(metaclass=Record):
+    """Of a link: rotation in ground by rows, position of its origin, origin of the spatial vectors, velocity,
+    acceleration while the derivatives of all speeds are zero (upwards against gravity); inertia (mass, first moment,
+    xx, yy, zz, xy, xz, yz) and wrench of it, and of all that it carries too after the evaluation."""
+
+    ROTATION, POSITION, ORIGIN, VELOCITY, ACCELERATION, INERTIA, WRENCH, SIZE = 0, 9, 12, 15, 21, 27, 37, 44
+
+
+class OPERATION_WORK(metaclass=Record):
+    """Work of an operation: the axis, or the frame by rows whose axes a ball's speeds are about; where that is; amount,
+    rate and second derivative without udot, if a function gives them."""
+
+    AXIS, POINT, AMOUNT, RATE, CURVATURE, SIZE = 0, 9, 12, 13, 14, 16
+
+
+class CONTACT_WORK(metaclass=Record):
+    """Work of a contact: force on surface 2, its point, depth and radius of the law; force and depth are 0 without
+    contact."""
+
+    FORCE, DEPTH, RADIUS, SIZE = 0, 6, 7, 8
+
 
 # Kinds.
-TURN, SLIDE, BALL, BALL_BACK, ACCELERATION_ERROR = 0, 1, 2, 3, 4
-"""Motions: about z, along an axis (those before BALL have one axis), a SphericalMotion, one that is passed from end to
-start, a SimbodyAccelerationError."""
-NOTHING, SHIFT, MOVE = 0, 1, 2
-"""Fixed transforms: none, a translation, any."""
-OK, SINGULAR_MASS, SINGULAR_RATES, FAR, FAILED, UNSOLVED = 0, 1, 2, 3, 4, 5
-"""What becomes of an evaluation: good, a degree of freedom moves no mass, the rates of a ball are not defined; of a
-projection: too far from where the constraints hold; of a kernel in Python: it raised an error; of an item: its law has
-no solution."""
-ACCELERATION_STAGE, POSITION_STAGE, FORCE_STAGE, VELOCITY_STAGE = 0, 1, 2, 3
-"""How far an evaluation goes: to the accelerations, to the places of the links, to the forces (those that items apply
-are then in the place of the accelerations), to the velocities."""
+class MOTION(metaclass=Record):
+    """Motions: about z, along an axis (those before BALL have one axis), a SphericalMotion, one that is passed from end
+    to start, a SimbodyAccelerationError."""
+
+    TURN, SLIDE, BALL, BALL_BACK, ACCELERATION_ERROR = range(5)
+
+
+class TRANSFORM(metaclass=Record):
+    """Fixed transforms: none, a translation, any."""
+
+    NOTHING, SHIFT, MOVE = range(3)
+
+
+class OUTCOME(metaclass=Record):
+    """What becomes of an evaluation: good, a degree of freedom moves no mass, the rates of a ball are not defined; of a
+    projection: too far from where the constraints hold; of a kernel in Python: it raised an error; of an item: its law
+    has no solution."""
+
+    OK, SINGULAR_MASS, SINGULAR_RATES, FAR, FAILED, UNSOLVED = range(6)
+
+
+class STAGE(metaclass=Record):
+    """How far an evaluation goes: to the accelerations, to the positions of the links, to the forces (those that items
+    apply are then in place of the accelerations), to the velocities."""
+
+    ACCELERATION, POSITION, FORCE, VELOCITY = range(4)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from osimlite.simulation.kernels.layout import CONSTRAINED, FACTORISE, FREEDOMS, LAWS, MINIMUM_NORM, SCRATCH
+from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, WORK
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
 # A factor of count equations for size unknowns: the turned equations with the reflections (count, size), their diagonal
@@ -25,26 +25,26 @@ def factor_room(count: int, size: int) -> int:
 
 def factored(s: Ints, w: Floats, count: int, a: Floats, smallest: float) -> int:
     """Turn equations for all speeds into the factor, see `factorise`; returns how many count."""
-    w[SCRATCH] = smallest
-    return call(s[LAWS + s[s[CONSTRAINED] + FACTORISE]], s, w, w, a, a, count)
+    w[WORK.SCRATCH] = smallest
+    return call(s[MODEL.LAWS + s[s[MODEL.CONSTRAINED] + CONSTRAINED.FACTORISE]], s, w, w, a, a, count)
 
 
 def solved(s: Ints, count: int, a: Floats, values: Floats, room: Floats, x: Floats) -> None:
     """The shortest x that comes nearest to fulfilling equations that were `factored`, see `minimum_norm`."""
-    call(s[LAWS + s[s[CONSTRAINED] + MINIMUM_NORM]], s, values, room, a, x, count)
+    call(s[MODEL.LAWS + s[s[MODEL.CONSTRAINED] + CONSTRAINED.MINIMUM_NORM]], s, values, room, a, x, count)
 
 
 def factorise_law(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int) -> int:
     """`factorise` for others to call by its address: the factor f, what counts in SCRATCH."""
-    size = s[FREEDOMS]
-    rank = factorise(count, size, f, w[SCRATCH])
+    size = s[MODEL.DOFS]
+    rank = factorise(count, size, f, w[WORK.SCRATCH])
     f[factor_room(count, size) - 1] = rank
     return rank
 
 
 def minimum_norm_law(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int) -> int:
     """`minimum_norm` for others to call by its address: right sides x, room w, factor y, solution f."""
-    size = s[FREEDOMS]
+    size = s[MODEL.DOFS]
     rank = int(y[factor_room(count, size) - 1])
     minimum_norm(count, size, y, rank, x, w, f)
     return rank

@@ -6,7 +6,7 @@ from math import inf
 
 from osimlite.simulation.integrators import next_step_size
 from osimlite.simulation.kernels.error_control import step_error
-from osimlite.simulation.kernels.layout import ACCELERATION_STAGE, LAWS, OK, STATE_SIZE, TIME, WORK_STATE
+from osimlite.simulation.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.kernels.method import (
     ACCEPTED,
     ERRORS,
@@ -27,26 +27,26 @@ HEAD, STATES, IS_IMPLICIT = MEMORY + 1, 3, False
 def merson(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> int:
     """Try one step from y0, behind which its derivative stands, to y1."""
     h = at(w, place)
-    errors, stages = at(w, s[WORK_STATE] + ERRORS * s[STATE_SIZE]), at(h, HEAD)
+    errors, stages = at(w, s[MODEL.WORK_STATE] + ERRORS * s[MODEL.STATE_SIZE]), at(h, HEAD)
     t0, limit, step, accuracy = h[REACHED], h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED]
     # A step that all but reaches the limit goes there. One cut much shorter tells nothing about the next.
     t1 = limit if limit <= t0 + 1.001 * step else t0 + step
     h[EVALUATED], h[HAS_DERIVATIVE] = 4.0, 0.0
     error = inf
-    if staged(s, x, w, t0, t1, y0, y1, errors, stages) == OK:
+    if staged(s, x, w, t0, t1, y0, y1, errors, stages) == OUTCOME.OK:
         error = step_error(s, x, w, t1, y0, y1, errors, h, 0)
     h[NEXT_STEP] = min(max(next_step_size(step, error, accuracy, limit < t0 + 0.95 * step), h[SHORTEST]), h[LONGEST])
     # The shortest step that is allowed is taken whatever its error, as in Simbody.
     if error <= accuracy or (step <= h[SHORTEST] and error < inf):
         h[REACHED] = t1
-    return OK
+    return OUTCOME.OK
 
 
 def staged(
     s: Ints, x: Floats, w: Floats, t0: float, t1: float, y0: Floats, y1: Floats, ya: Floats, stages: Floats
 ) -> int:
     """Compute y1 and, in `ya`, its errors."""
-    size, h = s[STATE_SIZE], t1 - t0
+    size, h = s[MODEL.STATE_SIZE], t1 - t0
     f0, fa, fb, fc = at(y0, size), stages, at(stages, size), at(stages, 2 * size)
     for stage in range(4):
         # Where the next evaluation is to be.
@@ -69,13 +69,13 @@ def staged(
             c = h / 2.0
             for k in range(size):
                 ya[k] = y0[k] + c * (f0[k] - 3.0 * fb[k] + 4.0 * fc[k])
-        w[TIME] = t
-        status = call(s[LAWS], s, x, w, ya, f, ACCELERATION_STAGE)
-        if status != OK:
+        w[WORK.TIME] = t
+        status = call(s[MODEL.LAWS], s, x, w, ya, f, STAGE.ACCELERATION)
+        if status != OUTCOME.OK:
             return status
     c = h / 6.0
     for k in range(size):
         y1[k] = y0[k] + c * (f0[k] + 4.0 * fc[k] + fa[k])
         # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its steps too.
         ya[k] = 0.2 * (y1[k] - ya[k])
-    return OK
+    return OUTCOME.OK

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from osimlite.forces.elastic_foundation import spring_in_half_space, spring_in_sphere, spring_load
 from osimlite.forces.vectors import ZERO, Vector, dot, minus, norm, plus, put, times, vector
-from osimlite.simulation.kernels.layout import CONTACT_AT, DEPTH_OF, FIRST_CONTACT, NUMBERS, OK, OWN, RECORD
+from osimlite.simulation.kernels.layout import CONTACT_WORK, ITEM, MODEL, OUTCOME
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import angular_velocity, apply_force, apply_torque, direction, station, velocity
 
@@ -23,17 +23,17 @@ def touch_mesh(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
     of the ball around the mesh in its link, and c, us, ud, uv, vt of the law.
     """
     i = at(s, item)
-    one, two, count, is_plane = i[OWN], i[OWN + 1], i[OWN + 3], i[OWN + 4]
-    p, result = at(x, i[NUMBERS]), at(w, i[RECORD])
+    one, two, count, is_plane = i[ITEM.OWN], i[ITEM.OWN + 1], i[ITEM.OWN + 3], i[ITEM.OWN + 4]
+    p, result = at(x, i[ITEM.NUMBERS]), at(w, i[ITEM.RECORD])
     for k in range(MESH_WORK):
         result[k] = 0.0
     o, about = station(s, w, one, vector(p, 0)), station(s, w, two, vector(p, 7))
     n, way = direction(s, w, one, vector(p, 3)), minus(about, o)
     if is_plane:
         if dot(way, n) >= p[10]:
-            return OK
+            return OUTCOME.OK
     elif dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
-        return OK
+        return OUTCOME.OK
     v = minus(velocity(s, w, one, about), velocity(s, w, two, about))
     turning = minus(angular_velocity(s, w, one), angular_velocity(s, w, two))
     force = torque = ZERO
@@ -48,14 +48,14 @@ def touch_mesh(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
             )
             force, torque, energy = plus(force, push), plus(torque, turn), energy + stored
     load_mesh(s, w, item, about, force, torque, energy)
-    return OK
+    return OUTCOME.OK
 
 
 def load_mesh(s: Ints, w: Floats, item: int, about: Vector, force: Vector, torque: Vector, energy: float) -> None:
     """Apply a force at a point, and a torque, to the mesh, and their opposites to surface 1; fill both records."""
     i = at(s, item)
-    one, two, result = i[OWN], i[OWN + 1], at(w, i[RECORD])
-    contact = at(w, s[s[s[CONTACT_AT] + i[FIRST_CONTACT] + i[OWN + 2]] + RECORD])
+    one, two, result = i[ITEM.OWN], i[ITEM.OWN + 1], at(w, i[ITEM.RECORD])
+    contact = at(w, s[s[s[MODEL.CONTACT_AT] + i[ITEM.FIRST_CONTACT] + i[ITEM.OWN + 2]] + ITEM.RECORD])
     put(result, 0, force)
     put(result, 3, about)
     put(result, 6, torque)
@@ -67,4 +67,4 @@ def load_mesh(s: Ints, w: Floats, item: int, about: Vector, force: Vector, torqu
     apply_force(s, w, one, about, times(-1.0, force))
     apply_torque(s, w, one, times(-1.0, torque))
     if norm(force) != 0.0:
-        contact[DEPTH_OF] = 1.0
+        contact[CONTACT_WORK.DEPTH] = 1.0

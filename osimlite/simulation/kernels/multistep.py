@@ -16,7 +16,7 @@ from math import inf, sqrt
 
 from osimlite.simulation.kernels.condensation import condense, correct, linearise, product
 from osimlite.simulation.kernels.error_control import error_norm, step_error
-from osimlite.simulation.kernels.layout import ACCELERATION_STAGE, LAWS, OK, STATE_SIZE, TIME, WORK_STATE
+from osimlite.simulation.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.kernels.method import (
     ACCEPTED,
     ERRORS,
@@ -82,10 +82,10 @@ def adams(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> 
 
 def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int, method: int) -> int:
     """The same by either: BDF or ADAMS."""
-    size = s[STATE_SIZE]
+    size = s[MODEL.STATE_SIZE]
     h = at(w, place)
     rows, room = at(h, HEAD), at(h, HEAD + STATES * size)
-    d, psi, errors = at(rows, ROWS * size), at(rows, (ROWS + 1) * size), at(w, s[WORK_STATE] + ERRORS * size)
+    d, psi, errors = at(rows, ROWS * size), at(rows, (ROWS + 1) * size), at(w, s[MODEL.WORK_STATE] + ERRORS * size)
     h[EVALUATED], h[HAS_DERIVATIVE] = 0.0, 1.0
     if h[ORDER] == 0.0:
         begin(s, h, y0, rows)
@@ -100,8 +100,8 @@ def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int,
     while True:
         predict(size, method, order, rows, y1, psi)
         if h[AGE] <= 0.0 or h[AGE] > RENEWED:
-            w[TIME] = t1
-            is_new = linearise(s, x, w, y1, at(y1, size), room) == OK
+            w[WORK.TIME] = t1
+            is_new = linearise(s, x, w, y1, at(y1, size), room) == OUTCOME.OK
             h[AGE], h[CONDENSED] = 1.0 if is_new else 0.0, 0.0
         if h[AGE] > 0.0 and (h[CONDENSED] == c or condense(s, c, room)):
             h[CONDENSED] = c
@@ -116,7 +116,7 @@ def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int,
         error = step_error(s, x, w, t1, y0, y1, errors, h, 1)
     if not error <= accuracy:
         refuse(size, method, h, rows, error / accuracy)
-        return OK
+        return OUTCOME.OK
     h[AGE] += 1.0
     h[REFUSED] = 0.0
     h[REACHED] = t1
@@ -137,12 +137,12 @@ def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int,
     if h[EQUAL] > order:
         choose(s, method, h, y0, rows, errors, error, SAFETY * (2 * ITERATIONS + 1) / (2 * ITERATIONS + iterations))
     h[NEXT_STEP] = h[STEP]
-    return OK
+    return OUTCOME.OK
 
 
 def begin(s: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
     """Start with order 1, and a step that changes little."""
-    size = s[STATE_SIZE]
+    size = s[MODEL.STATE_SIZE]
     speed = error_norm(s, y0, at(y0, size), h, 1)
     h[STEP] = min(h[NEXT_STEP], 0.1 * sqrt(h[ACCEPTED]) / max(speed, 1.0))
     h[ORDER], h[EQUAL], h[AGE], h[REFUSED] = 1.0, 0.0, 0.0, 0.0
@@ -182,13 +182,13 @@ def newton(
 
     None if they do not converge.
     """
-    size, f1, rest, before = s[STATE_SIZE], at(y1, s[STATE_SIZE]), 0.0, 0.0
+    size, f1, rest, before = s[MODEL.STATE_SIZE], at(y1, s[MODEL.STATE_SIZE]), 0.0, 0.0
     for k in range(size):
         d[k] = 0.0
     for iteration in range(ITERATIONS):
         h[EVALUATED] += 1.0
-        w[TIME] = t
-        if call(s[LAWS], s, x, w, y1, f1, ACCELERATION_STAGE) != OK or not is_finite(size, f1):
+        w[WORK.TIME] = t
+        if call(s[MODEL.LAWS], s, x, w, y1, f1, STAGE.ACCELERATION) != OUTCOME.OK or not is_finite(size, f1):
             return 0
         for k in range(size):
             step[k] = c * f1[k] - psi[k] - d[k]
@@ -227,7 +227,7 @@ def choose(
     s: Ints, method: int, h: Floats, y0: Floats, rows: Floats, errors: Floats, error: float, safety: float
 ) -> None:
     """Choose order and step for the next steps."""
-    size, order, accuracy = s[STATE_SIZE], int(h[ORDER]), h[ACCEPTED]
+    size, order, accuracy = s[MODEL.STATE_SIZE], int(h[ORDER]), h[ACCEPTED]
     best, factor = order, reach(error / accuracy, order)
     for other in (order - 1, order + 1):
         if not 1 <= other <= MOST_ORDER[method]:

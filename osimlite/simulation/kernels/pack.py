@@ -18,8 +18,19 @@ from osimlite.records import dataclass, field
 from osimlite.simulation.constrained import constraints_on, free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.items import CONTROLS, ForceElement, Placement, Places, Response
-from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
+from osimlite.simulation.kernels.layout import (
+    CONSTRAINED,
+    CONTACT_WORK,
+    ITEM,
+    LINK_WORK,
+    MODEL,
+    MOTION,
+    OPERATION,
+    OPERATION_WORK,
+    TRANSFORM,
+    WORK,
+)
 from osimlite.simulation.kernels.pack_constraints import constraint_record, room_for
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.kernels.record import STATES
@@ -142,7 +153,7 @@ def _operations(
         elif isinstance(motion, SimbodyAccelerationError):
             if motion.elementary() and not free.isdisjoint(own):
                 sign = -1 if mobilizer.reversed else 1
-                result.append(_Operation(at.ACCELERATION_ERROR, frame, [], looked_at=[sign, *own[:2]]))
+                result.append(_Operation(MOTION.ACCELERATION_ERROR, frame, [], looked_at=[sign, *own[:2]]))
                 drifts.append((result[-1], motion))
                 frame = np.eye(4)
         elif still:
@@ -155,14 +166,14 @@ def _operations(
             function = None if motion.function == IDENTITY else motion.function
             if motion.kind == "rotate":
                 turned = transform(_to_axis(axis))
-                result.append(_Operation(at.TURN, frame @ turned, places, function))
+                result.append(_Operation(MOTION.TURN, frame @ turned, places, function))
                 of_motion[id(motion)] = result[-1]
                 frame = inverse(turned)
             else:
-                result.append(_Operation(at.SLIDE, frame, places, function, axis=axis))
+                result.append(_Operation(MOTION.SLIDE, frame, places, function, axis=axis))
                 frame = np.eye(4)
         elif isinstance(motion, SphericalMotion):
-            kind = at.BALL_BACK if mobilizer.reversed else at.BALL
+            kind = MOTION.BALL_BACK if mobilizer.reversed else MOTION.BALL
             result.append(_Operation(kind, frame, places, radii=motion.radii))
             frame = np.eye(4)
         else:
@@ -226,9 +237,9 @@ class Packer:
         self.controls = forces.controls
         self.state = state
         self.operations = [operation for link in links for operation in link.operations]
-        self.ints: list[int] = [0] * (at.LAWS + len(LAW_NUMBERS))
+        self.ints: list[int] = [0] * (MODEL.LAWS + len(LAW_NUMBERS))
         self.numbers: list[float] = [float(x) for x in places.mechanism.gravity]
-        self.work = at.WORK_HEAD
+        self.work = WORK.SIZE
         self.entries = 0
         self.balls: dict[tuple[int, ...], int] = {}
         self.laws: list[str] = ["evaluate"]
@@ -242,14 +253,14 @@ class Packer:
         ints, size = self.ints, len(order)
         for link in self.links:
             self.numbers += _inertia(link)
-        ints[at.FIXED_AT] = len(self.numbers)
+        ints[MODEL.FIXED_AT] = len(self.numbers)
         for operation in self.operations:
             before = operation.before
             self.numbers += [*before[:3, :3].ravel().tolist(), *before[:3, 3].tolist(), *operation.axis.tolist()]
-        ints[at.LINKS], ints[at.FREEDOMS] = len(self.links), size
-        ints[at.WORK_LINK] = self.room(at.LINK_WORK * len(self.links))
-        ints[at.WORK_OPERATION] = self.room(at.OPERATION_WORK * len(self.operations))
-        ints[at.WORK_COLUMN], ints[at.WORK_PIVOT] = self.room(6 * size), self.room(size)
+        ints[MODEL.LINKS], ints[MODEL.DOFS] = len(self.links), size
+        ints[MODEL.WORK_LINK] = self.room(LINK_WORK.SIZE * len(self.links))
+        ints[MODEL.WORK_OPERATION] = self.room(OPERATION_WORK.SIZE * len(self.operations))
+        ints[MODEL.WORK_COLUMN], ints[MODEL.WORK_PIVOT] = self.room(6 * size), self.room(size)
         above = self.link_records()
         self.freedom_records(above)
         self.operation_records()
@@ -258,12 +269,12 @@ class Packer:
             from osimlite.simulation.kernels.pack_chain import pack_chain
 
             pack_chain(self, self.chain)
-        ints[at.WORK_CONTROL] = self.room(len(self.controls.names))
+        ints[MODEL.WORK_CONTROL] = self.room(len(self.controls.names))
         result = self.item_records()
         self.control_record()
-        ints[at.STATE_SIZE] = self.state.size
-        ints[at.WORK_STATE] = self.room(ints[at.STATE_SIZE] * STATES)
-        ints[at.WORK_SIZE] = self.work
+        ints[MODEL.STATE_SIZE] = self.state.size
+        ints[MODEL.WORK_STATE] = self.room(ints[MODEL.STATE_SIZE] * STATES)
+        ints[MODEL.WORK_SIZE] = self.work
         structure, numbers = np.array(ints, dtype=np.int64), np.array(self.numbers, dtype=np.float64)
         laws = tuple(dict.fromkeys(self.laws))
         asked = self.kernels, self.equilibria, self.responses, self.owners
@@ -281,7 +292,7 @@ class Packer:
 
     def link_records(self) -> list[int]:
         """Write the links; returns the degree of freedom above each."""
-        self.ints[at.LINK_AT] = len(self.ints)
+        self.ints[MODEL.LINK_AT] = len(self.ints)
         above, carrying, operation = [-1] * self.ends[-1], [-1] * len(self.links), 0
         for number, link in enumerate(self.links):
             first, end = self.ends[number], self.ends[number + 1]
@@ -295,45 +306,45 @@ class Packer:
 
     def freedom_records(self, above: Sequence[int]) -> None:
         """Write the degrees of freedom, and the list of those whose columns are sums."""
-        self.ints[at.FREEDOM_AT] = len(self.ints)
+        self.ints[MODEL.DOF_AT] = len(self.ints)
         depths: list[int] = []
         for freedom in above:
             depths.append(depths[freedom] + 1 if freedom >= 0 else 0)
             self.ints += [freedom, self.room(depths[-1] + 1), depths[-1]]
             self.entries += depths[-1] + 1
-        self.ints[at.SUMMED_AT] = len(self.ints)
+        self.ints[MODEL.SUMMED_AT] = len(self.ints)
         summed = [number for number in range(len(above)) if not self.is_alone(number)]
-        self.ints[at.SUMMED] = len(summed)
+        self.ints[MODEL.SUMMED] = len(summed)
         self.ints += summed
 
     def is_alone(self, freedom: int) -> bool:
         """Whether a degree of freedom is the amount of one operation, and nothing else."""
         users = [item for item in self.operations if freedom in map(self.places.freedom, item.arguments)]
-        return len(users) == 1 and users[0].function is None and users[0].kind in (at.TURN, at.SLIDE)
+        return len(users) == 1 and users[0].function is None and users[0].kind in (MOTION.TURN, MOTION.SLIDE)
 
     def operation_records(self) -> None:
         """Write the operations, and what their functions need."""
-        start = self.ints[at.OPERATION_AT] = len(self.ints)
-        self.ints += [0] * (at.OPERATION_INTS * len(self.operations))
+        start = self.ints[MODEL.OPERATION_AT] = len(self.ints)
+        self.ints += [0] * (OPERATION.SIZE * len(self.operations))
         numbers = {id(item): number for number, item in enumerate(self.operations)}
         for number, item in enumerate(self.operations):
-            freedom, law, gradient = -1, at.ALONE, 0
+            freedom, law, gradient = -1, OPERATION.ALONE, 0
             extra = len(self.numbers)
             freedoms = [self.places.freedom(place) for place in item.arguments]
             looked_at: list[int] = []
-            if item.kind == at.ACCELERATION_ERROR:
+            if item.kind == MOTION.ACCELERATION_ERROR:
                 law = self.law("place_drift")
                 self.law("move_drift")
                 sign, *watched = item.looked_at
                 looked_at = [sign, *(self.places.freedom(place) for place in watched), *[-1] * (2 - len(watched))]
                 looked_at += [-1 if turn is None else numbers[id(turn)] for turn in item.turns]
-            elif item.kind in (at.BALL, at.BALL_BACK):
+            elif item.kind in (MOTION.BALL, MOTION.BALL_BACK):
                 law = self.law("place_ball")
                 self.law("move_ball")
                 self.numbers += item.radii.tolist()
             elif item.function is None:
                 freedom = freedoms[0]
-                law = at.ALONE if self.is_alone(freedom) else at.TOGETHER
+                law = OPERATION.ALONE if self.is_alone(freedom) else OPERATION.TOGETHER
             else:
                 infos = [self.places.mechanism.coordinates[place] for place in item.arguments]
                 table = function_table(item.function, f"the function of an axis of the joint '{infos[0].joint}'")
@@ -342,18 +353,18 @@ class Packer:
                 gradient = self.room(len(freedoms))
             arguments = len(self.ints)
             self.ints += [*freedoms, *looked_at]
-            if item.kind in (at.BALL, at.BALL_BACK):
+            if item.kind in (MOTION.BALL, MOTION.BALL_BACK):
                 self.balls[tuple(freedoms)] = arguments
             record = [item.kind, _kind_of(item.before), freedom, law, arguments, len(freedoms), extra, gradient]
-            self.ints[start + at.OPERATION_INTS * number : start + at.OPERATION_INTS * (number + 1)] = record
+            self.ints[start + OPERATION.SIZE * number : start + OPERATION.SIZE * (number + 1)] = record
 
     def constraint_records(self, kept: Sequence[Constraint], locks: int) -> None:
         """Write what constraints need, if there are any."""
         if not kept:
             return
-        start, size = len(self.ints), self.ints[at.FREEDOMS]
-        head = [0] * at.CONSTRAINED_INTS
-        self.ints[at.CONSTRAINED] = start
+        start, size = len(self.ints), self.ints[MODEL.DOFS]
+        head = [0] * CONSTRAINED.SIZE
+        self.ints[MODEL.CONSTRAINED] = start
         self.ints += head
         constraints = [constraint_record(item, self.places, self.balls) for item in kept]
         records: list[int] = []
@@ -367,35 +378,41 @@ class Packer:
             self.ints += [self.law(constraint.law), len(self.numbers), equations, end, end_position, *ints]
             self.numbers += constraint.numbers
             equations = end
-        head[at.CONSTRAINED_DYNAMICS], head[at.PROJECT] = self.law("constrained_dynamics"), self.law("project")
-        head[at.FACTORISE], head[at.MINIMUM_NORM] = self.law("factorise_law"), self.law("minimum_norm_law")
-        head[at.CONSTRAINTS], head[at.CONSTRAINT_AT] = len(constraints), len(self.ints)
+        head[CONSTRAINED.DYNAMICS], head[CONSTRAINED.PROJECT] = self.law("constrained_dynamics"), self.law("project")
+        head[CONSTRAINED.FACTORISE], head[CONSTRAINED.MINIMUM_NORM] = (
+            self.law("factorise_law"),
+            self.law("minimum_norm_law"),
+        )
+        head[CONSTRAINED.CONSTRAINTS], head[CONSTRAINED.CONSTRAINT_AT] = len(constraints), len(self.ints)
         self.ints += records
-        head[at.BALLS], head[at.BALL_AT] = len(self.balls), len(self.ints)
+        head[CONSTRAINED.BALLS], head[CONSTRAINED.BALL_AT] = len(self.balls), len(self.ints)
         self.ints += self.balls.values()
-        head[at.EQUATIONS], head[at.POSITIONS] = equations, sum(constraint.positions for constraint in constraints)
-        head[at.LOCKS], head[at.ENTRIES] = locks, self.entries
+        head[CONSTRAINED.EQUATIONS], head[CONSTRAINED.POSITIONS] = (
+            equations,
+            sum(constraint.positions for constraint in constraints),
+        )
+        head[CONSTRAINED.LOCKS], head[CONSTRAINED.ENTRIES] = locks, self.entries
         for place, count in room_for(equations, size, self.entries).items():
             head[place] = self.room(count)
-        self.ints[start : start + at.CONSTRAINED_INTS] = head
+        self.ints[start : start + CONSTRAINED.SIZE] = head
 
     def item_records(self) -> list[list[tuple[int, int]]]:
         """Write the items; the records of the contacts come first, in their order."""
         groups = [element.items(self.places) for element in self.elements]
-        self.ints[at.CONTACTS] = sum(item.is_contact for group in groups for item in group)
-        contact = self.ints[at.WORK_CONTACT] = self.room(at.CONTACT_WORK * self.ints[at.CONTACTS])
+        self.ints[MODEL.CONTACTS] = sum(item.is_contact for group in groups for item in group)
+        contact = self.ints[MODEL.WORK_CONTACT] = self.room(CONTACT_WORK.SIZE * self.ints[MODEL.CONTACTS])
         records: list[int] = []
         pairs: list[int] = []
         settling: dict[int, str] = {}
         responding: dict[int, Response] = {}
         result: list[list[tuple[int, int]]] = []
-        places = {CONTROLS: self.ints[at.WORK_CONTROL]}
+        places = {CONTROLS: self.ints[MODEL.WORK_CONTROL]}
         for owner, (element, group) in enumerate(zip(self.elements, groups, strict=True)):
             result.append([])
             first = len(pairs)
             for item in group:
-                place = contact + at.CONTACT_WORK * len(pairs) if item.is_contact else self.room(item.room)
-                result[-1].append((place, at.CONTACT_WORK if item.is_contact else item.room))
+                place = contact + CONTACT_WORK.SIZE * len(pairs) if item.is_contact else self.room(item.room)
+                result[-1].append((place, CONTACT_WORK.SIZE if item.is_contact else item.room))
                 if item.is_contact:
                     pairs.append(len(self.ints))
                 if not item.is_part:
@@ -414,31 +431,31 @@ class Packer:
                 places[element.path] = place
                 self.ints += [0, len(self.numbers), place, first, *own]
                 self.numbers += item.numbers
-        self.ints[at.ITEMS], self.ints[at.ITEM_AT] = len(records), len(self.ints)
+        self.ints[MODEL.ITEMS], self.ints[MODEL.ITEM_AT] = len(records), len(self.ints)
         self.ints += records
-        self.ints[at.CONTACT_AT] = len(self.ints)
+        self.ints[MODEL.CONTACT_AT] = len(self.ints)
         self.ints += pairs
-        self.ints[at.EQUILIBRIA], self.ints[at.EQUILIBRIUM_AT] = len(settling), len(self.ints)
+        self.ints[MODEL.EQUILIBRIA], self.ints[MODEL.EQUILIBRIUM_AT] = len(settling), len(self.ints)
         for place, kernel in settling.items():
             self.equilibria[len(self.ints)] = kernel
             self.ints += [0, place]
-        self.ints[at.RESPONSES], self.ints[at.RESPONSE_AT] = len(responding), len(self.ints)
+        self.ints[MODEL.RESPONSES], self.ints[MODEL.RESPONSE_AT] = len(responding), len(self.ints)
         for place, response in responding.items():
             self.responses[len(self.ints)] = response.kernel
-            self.ints += [0, place, at.OWN + response.first_state, response.states, response.sense]
+            self.ints += [0, place, ITEM.OWN + response.first_state, response.states, response.sense]
         return result
 
     def control_record(self) -> None:
         """Write the controls, if there are any, behind all else: some motions have others there."""
         if not self.controls.names:
             return
-        self.ints[at.CONTROLS] = len(self.ints)
+        self.ints[MODEL.CONTROLS] = len(self.ints)
         own, numbers, self.kernels[len(self.ints)] = self.controls.record()
-        self.ints += [0, len(self.numbers), self.ints[at.WORK_CONTROL], 0, *own]
+        self.ints += [0, len(self.numbers), self.ints[MODEL.WORK_CONTROL], 0, *own]
         self.numbers += numbers
 
 
 def _kind_of(matrix: Array) -> int:
     if not np.array_equal(matrix[:3, :3], np.eye(3)):
-        return at.MOVE
-    return at.SHIFT if matrix[:3, 3].any() else at.NOTHING
+        return TRANSFORM.MOVE
+    return TRANSFORM.SHIFT if matrix[:3, 3].any() else TRANSFORM.NOTHING

@@ -10,7 +10,7 @@ from osimlite.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
 from osimlite.multibody.parts import GROUND
 from osimlite.robot.lines import as_line
 from osimlite.robot.robot import RobotJoint
-from osimlite.simulation.kernels import layout as at
+from osimlite.simulation.kernels.layout import CHAIN, DOF, JOINT, JOINT_KIND, MODEL, MOTION
 
 if TYPE_CHECKING:
     from osimlite.simulation.kernels.pack import Packer
@@ -36,11 +36,11 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
     ints, count = packer.ints, len(chain.joints)
     if not count:
         return
-    start = ints[at.CHAIN] = len(ints)
-    head = [0] * at.CHAIN_INTS
+    start = ints[MODEL.CHAIN] = len(ints)
+    head = [0] * CHAIN.SIZE
     ints += head
-    packer.kernels[start + at.SUPPLY] = chain.supply
-    head[at.CHAIN_DYNAMICS], head[at.JOINTS] = packer.law("chain_dynamics"), count
+    packer.kernels[start + CHAIN.SUPPLY] = chain.supply
+    head[CHAIN.DYNAMICS], head[CHAIN.JOINTS] = packer.law("chain_dynamics"), count
     records: list[int] = []
     shares: list[tuple[int, int]] = []
     for number, joint in enumerate(chain.joints):
@@ -48,18 +48,18 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
         records += [kind, source, part, len(shares)]
         shares += [(number, freedom) for freedom in freedoms]
     lists = {
-        (at.JOINTS, at.JOINT_AT): (at.JOINT_INTS, records),
-        (at.SHARES, at.SHARE_AT): (2, [item for share in shares for item in share]),
-        (at.PRODUCTS, at.PRODUCT_AT): (4, _products(packer, shares, count)),
-        (at.EXCESSES, at.EXCESS_AT): (3, _excesses(packer, chain.excess)),
+        (CHAIN.JOINTS, CHAIN.JOINT_AT): (JOINT.SIZE, records),
+        (CHAIN.SHARES, CHAIN.SHARE_AT): (2, [item for share in shares for item in share]),
+        (CHAIN.PRODUCTS, CHAIN.PRODUCT_AT): (4, _products(packer, shares, count)),
+        (CHAIN.EXCESSES, CHAIN.EXCESS_AT): (3, _excesses(packer, chain.excess)),
     }
     for (length, place), (each, numbers) in lists.items():
         head[length], head[place] = len(numbers) // each, len(ints)
         ints += numbers
-    head[at.WORK_JOINTS], head[at.WORK_SHARES] = packer.room((4 + count) * count), packer.room(len(shares))
-    head[at.ENTRY_AT] = ints[ints[at.FREEDOM_AT] + at.ROW]
-    head[at.END_ENTRY] = head[at.ENTRY_AT] + packer.entries
-    ints[start : start + at.CHAIN_INTS] = head
+    head[CHAIN.WORK_JOINTS], head[CHAIN.WORK_SHARES] = packer.room((4 + count) * count), packer.room(len(shares))
+    head[CHAIN.ENTRY_AT] = ints[ints[MODEL.DOF_AT] + DOF.ROW]
+    head[CHAIN.END_ENTRY] = head[CHAIN.ENTRY_AT] + packer.entries
+    ints[start : start + CHAIN.SIZE] = head
 
 
 def _followed(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, list[int]]:
@@ -69,20 +69,20 @@ def _followed(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, list[in
     for number, operation in enumerate(packer.operations):
         if operation.joint != joint.source:
             continue
-        is_ball = operation.kind in (at.BALL, at.BALL_BACK)
-        if operation.kind == at.ACCELERATION_ERROR and isinstance(function, AccelerationErrorAngle):
-            return at.ERROR, number, function.component, []
+        is_ball = operation.kind in (MOTION.BALL, MOTION.BALL_BACK)
+        if operation.kind == MOTION.ACCELERATION_ERROR and isinstance(function, AccelerationErrorAngle):
+            return JOINT_KIND.ERROR, number, function.component, []
         if is_ball and isinstance(function, EllipsoidPoint):
-            return at.ELLIPSOID, number, function.component, freedoms
+            return JOINT_KIND.ELLIPSOID, number, function.component, freedoms
         if is_ball and len(places) == 1 and places[0] in operation.arguments:
             angles = [packer.places.freedom(place) for place in operation.arguments]
-            return at.ANGLE, number, operation.arguments.index(places[0]), angles
+            return JOINT_KIND.ANGLE, number, operation.arguments.index(places[0]), angles
         if operation.function is function and operation.arguments == places:
-            return at.AMOUNT_OF, number, 0, freedoms
+            return JOINT_KIND.AMOUNT_OF, number, 0, freedoms
     line = as_line(function)
     assert line is not None and line.start == 0.0, f"nothing moves '{joint.name}'"
     packer.numbers.append(line.slope)
-    return at.LINE, freedoms[0], len(packer.numbers) - 1, freedoms
+    return JOINT_KIND.LINE, freedoms[0], len(packer.numbers) - 1, freedoms
 
 
 def _products(packer: Packer, shares: Sequence[tuple[int, int]], count: int) -> list[int]:
@@ -91,14 +91,14 @@ def _products(packer: Packer, shares: Sequence[tuple[int, int]], count: int) -> 
     for number, (joint, freedom) in enumerate(shares):
         of_freedom[freedom].append((number, joint))
     result: list[int] = []
-    freedoms = packer.ints[packer.ints[at.FREEDOM_AT] :]
-    for freedom in range(packer.ints[at.FREEDOMS]):
-        place, other = freedoms[at.FREEDOM_INTS * freedom + at.ROW], freedom
+    freedoms = packer.ints[packer.ints[MODEL.DOF_AT] :]
+    for freedom in range(packer.ints[MODEL.DOFS]):
+        place, other = freedoms[DOF.SIZE * freedom + DOF.ROW], freedom
         while other >= 0:
             for one, i in of_freedom[freedom]:
                 for two, j in of_freedom[other]:
                     result += one, two, count * i + j, place
-            place, other = place + 1, freedoms[at.FREEDOM_INTS * other + at.ABOVE]
+            place, other = place + 1, freedoms[DOF.SIZE * other + DOF.ABOVE]
     return result
 
 

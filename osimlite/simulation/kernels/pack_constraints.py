@@ -15,9 +15,9 @@ from osimlite.multibody.mechanism import FramePlacement, StationPlacement
 from osimlite.multibody.parts import GROUND
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.elements.items import Places
-from osimlite.simulation.kernels import layout as at
 from osimlite.simulation.kernels.constraint_equations import ARM, AXIS, DISTANCE, MEETING, PRODUCT, SLIP
 from osimlite.simulation.kernels.functions import function_table, table_of_one
+from osimlite.simulation.kernels.layout import CONSTRAINED
 from osimlite.simulation.kernels.least_squares import factor_room
 
 Balls = Mapping[tuple[int, ...], int]
@@ -96,14 +96,14 @@ def room_for(equations: int, size: int, entries: int) -> dict[int, int]:
     rows = equations * size
     by_multipliers, by_directions = 2 * (equations + size), 2 * (equations + size + size * size)
     return {
-        at.WORK_ROWS: rows,
-        at.WORK_ERRORS: equations,
-        at.WORK_RATES: equations,
-        at.WORK_DRIFTS: equations,
-        at.WORK_KEPT: rows,
-        at.WORK_FACTOR: factor_room(equations, size),
-        at.WORK_SYSTEM: entries + size + max(by_multipliers, by_directions),
-        at.WORK_TRIAL: 6 * size,
+        CONSTRAINED.WORK_ROWS: rows,
+        CONSTRAINED.WORK_ERRORS: equations,
+        CONSTRAINED.WORK_RATES: equations,
+        CONSTRAINED.WORK_DRIFTS: equations,
+        CONSTRAINED.WORK_KEPT: rows,
+        CONSTRAINED.WORK_FACTOR: factor_room(equations, size),
+        CONSTRAINED.WORK_SYSTEM: entries + size + max(by_multipliers, by_directions),
+        CONSTRAINED.WORK_TRIAL: 6 * size,
     }
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 from math import inf, nan
 
 from osimlite.forces.vectors import Vector, minus, norm, plus, put, turned, turned_back, vector
-from osimlite.simulation.kernels.layout import LAW, NUMBERS, OK, RECORD, UNSOLVED
+from osimlite.simulation.kernels.layout import ITEM, OUTCOME
 from osimlite.simulation.kernels.paths import (
     AT,
     COUNT,
@@ -87,11 +87,11 @@ def wrapped_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int)
             result = wrap(s, x, w, y, f, item, 1 - k if exchanged and k < 2 else k)
             if result == NOWHERE:
                 measure_points(s, w, y, item)
-                return OK
+                return OUTCOME.OK
             if result == BEYOND:
-                record = at(w, s[item + RECORD])
+                record = at(w, s[item + ITEM.RECORD])
                 record[LENGTH] = record[SPEED] = nan
-                return UNSOLVED
+                return OUTCOME.UNSOLVED
             if k == 0:
                 first = result
             elif k == 1:
@@ -102,26 +102,26 @@ def wrapped_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int)
         if turn == 0 and wraps > 1 and first == NONE and second == INSIDE:
             exchanged = True
             take_out(s, w, item, 0)
-    return OK
+    return OUTCOME.OK
 
 
 def place_surfaces(s: Ints, x: Floats, w: Floats, item: int) -> None:
     """Where the surfaces are; no tangent point is known."""
-    i, p = at(s, item), at(x, s[item + NUMBERS])
-    nodes, work = i[POINTS] + 2 * i[WRAPS], at(w, i[RECORD] + ORDER + i[POINTS] + 2 * i[WRAPS])
+    i, p = at(s, item), at(x, s[item + ITEM.NUMBERS])
+    nodes, work = i[POINTS] + 2 * i[WRAPS], at(w, i[ITEM.RECORD] + ORDER + i[POINTS] + 2 * i[WRAPS])
     for k in range(i[WRAPS]):
         number = i[POINTS] + 2 * k
         at(work, NODE_WORK * number)[IS_KEPT] = at(work, NODE_WORK * (number + 1))[IS_KEPT] = 0.0
         back = i[NODES_AT + NODE_INTS * nodes + WRAP_INTS * k + BACK]
         if back > 0:
-            node, pose = at(i, NODES_AT + NODE_INTS * number), at(w, s[item - back + RECORD] + POSE)
+            node, pose = at(i, NODES_AT + NODE_INTS * number), at(w, s[item - back + ITEM.RECORD] + POSE)
             n = at(p, node[AT])
             place_frame(s, w, node[LINK], at(n, TURN), vector(n, STATION), pose)
 
 
 def take_out(s: Ints, w: Floats, item: int, number: int) -> None:
     """Take the tangent points of a wrap out of the path, if they are in it."""
-    i, result = at(s, item), at(w, s[item + RECORD])
+    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
     order, count, first = at(result, ORDER), int(result[COUNT]), i[POINTS] + 2 * number
     kept = 0
     for k in range(count):
@@ -134,7 +134,7 @@ def take_out(s: Ints, w: Floats, item: int, number: int) -> None:
 def wrap(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int, number: int) -> int:
     """Find the way around one surface; returns what became of the last piece that was tried."""
     take_out(s, w, item, number)
-    i, result = at(s, item), at(w, s[item + RECORD])
+    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
     points, count = i[POINTS], int(result[COUNT])
     size = points + 2 * i[WRAPS]
     nodes, order, work = at(i, NODES_AT), at(result, ORDER), at(result, ORDER + size)
@@ -144,7 +144,7 @@ def wrap(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int, number:
     if own[FIRST] <= own[LAST] and own[LAST] >= points:
         return BEYOND
     surface = item - own[BACK]
-    e = at(w, s[surface + RECORD])
+    e = at(w, s[surface + ITEM.RECORD])
     begin = end = -1
     for k in range(count):
         if own[FIRST] <= order[k] <= own[LAST] and order[k] < points:
@@ -160,7 +160,7 @@ def wrap(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int, number:
             continue
         put(e, FIRST_END, in_surface(at(e, POSE), vector(a, PLACE)))
         put(e, SECOND_END, in_surface(at(e, POSE), vector(b, PLACE)))
-        says = call(s[surface + LAW], s, x, w, y, f, surface)
+        says = call(s[surface + ITEM.LAW], s, x, w, y, f, surface)
         if says < WRAPPED:
             continue
         r1 = in_ground(at(e, POSE), vector(e, FIRST_TANGENT))

@@ -10,29 +10,17 @@ from __future__ import annotations
 from osimlite.forces.vectors import Vector, along, dot, minus, norm, plus, put, times, turned, vector
 from osimlite.simulation.kernels.dynamics import clear_wrenches, generalized_forces
 from osimlite.simulation.kernels.functions import value_at
-from osimlite.simulation.kernels.layout import (
-    FORCE_STAGE,
-    FREEDOMS,
-    ITEM_AT,
-    ITEMS,
-    LAW,
-    LAWS,
-    NUMBERS,
-    OK,
-    OWN,
-    RECORD,
-    STATE_SIZE,
-)
+from osimlite.simulation.kernels.layout import ITEM, MODEL, OUTCOME, STAGE
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import apply_force, direction, station, velocity
 
-PULL = OWN
+PULL = ITEM.OWN
 """The first integer of the item of any path."""
 
 LENGTH, SPEED, TENSION = 0, 1, 2
 """The record of any path begins with length (m), lengthening speed (m/s) and tension (N)."""
 
-POINTS, WRAPS, NODES_AT = OWN + 1, OWN + 2, OWN + 3
+POINTS, WRAPS, NODES_AT = ITEM.OWN + 1, ITEM.OWN + 2, ITEM.OWN + 3
 """Integers of a path through points: how many points and wraps it has, and the records of its nodes: of the points, and
 then of two tangent points for each wrap."""
 
@@ -64,28 +52,28 @@ there, and nothing here."""
 
 def path_length(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, path: int) -> tuple[float, float]:
     """Length and lengthening speed of the path of an item."""
-    call(s[path + LAW], s, x, w, y, f, path)
-    result = at(w, s[path + RECORD])
+    call(s[path + ITEM.LAW], s, x, w, y, f, path)
+    result = at(w, s[path + ITEM.RECORD])
     return result[LENGTH], result[SPEED]
 
 
 def pull_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, path: int, tension: float) -> None:
     """Apply a tension along the path of an item, after its length was found."""
-    w[s[path + RECORD] + TENSION] = tension
-    call(s[path - s[path + PULL] + LAW], s, x, w, y, f, path)
+    w[s[path + ITEM.RECORD] + TENSION] = tension
+    call(s[path - s[path + PULL] + ITEM.LAW], s, x, w, y, f, path)
 
 
 def straight_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Length and speed of a path without wraps."""
     place_points(s, x, w, y, item)
     measure_points(s, w, y, item)
-    return OK
+    return OUTCOME.OK
 
 
 def place_points(s: Ints, x: Floats, w: Floats, y: Floats, item: int) -> None:
     """Where the points are, and which of them the path runs through."""
-    i, p = at(s, item), at(x, s[item + NUMBERS])
-    result = at(w, i[RECORD])
+    i, p = at(s, item), at(x, s[item + ITEM.NUMBERS])
+    result = at(w, i[ITEM.RECORD])
     order, work = at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
     count = 0
     for number in range(i[POINTS]):
@@ -120,7 +108,7 @@ def place_points(s: Ints, x: Floats, w: Floats, y: Floats, item: int) -> None:
 
 def measure_points(s: Ints, w: Floats, y: Floats, item: int) -> float:
     """Length, speed and directions, from the places of the nodes that the path runs through; returns the length."""
-    i, result = at(s, item), at(w, s[item + RECORD])
+    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
     nodes, order, work = at(i, NODES_AT), at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
     length = speed = 0.0
     for k in range(1, int(result[COUNT])):
@@ -155,7 +143,7 @@ def node_velocity(s: Ints, w: Floats, y: Floats, node: Ints, here: Floats) -> Ve
     """Velocity of a node; tangent points move with the body of their surface."""
     v = velocity(s, w, node[LINK], vector(here, PLACE))
     if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
-        return along(v, y[s[FREEDOMS] + node[OF]], vector(here, GRADIENT))
+        return along(v, y[s[MODEL.DOFS] + node[OF]], vector(here, GRADIENT))
     return v
 
 
@@ -164,7 +152,7 @@ def pull_points(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) 
 
     A moving point works on its coordinate too.
     """
-    i, result = at(s, item), at(w, s[item + RECORD])
+    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
     nodes, order, work = at(i, NODES_AT), at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
     tension, last = result[TENSION], int(result[COUNT]) - 1
     pull = 0.0, 0.0, 0.0
@@ -177,26 +165,26 @@ def pull_points(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) 
         force = minus(pull, back)
         apply_force(s, w, node[LINK], vector(here, PLACE), force)
         if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
-            f[s[FREEDOMS] + node[OF]] += dot(force, vector(here, GRADIENT))
-    return OK
+            f[s[MODEL.DOFS] + node[OF]] += dot(force, vector(here, GRADIENT))
+    return OUTCOME.OK
 
 
 def pull_each(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int, states: Floats, forces: Floats) -> int:
     """The generalized forces of 1 N along each item, all of which are paths, in a row each, state by state."""
-    size, items = s[FREEDOMS], s[ITEMS]
+    size, items = s[MODEL.DOFS], s[MODEL.ITEMS]
     applied = at(f, size)
     for row in range(count):
-        for k in range(s[STATE_SIZE]):
-            y[k] = states[s[STATE_SIZE] * row + k]
-        status = call(s[LAWS], s, x, w, y, f, FORCE_STAGE)
-        if status != OK:
+        for k in range(s[MODEL.STATE_SIZE]):
+            y[k] = states[s[MODEL.STATE_SIZE] * row + k]
+        status = call(s[MODEL.LAWS], s, x, w, y, f, STAGE.FORCE)
+        if status != OUTCOME.OK:
             return status
         for number in range(items):
             clear_wrenches(s, w)
             for k in range(size):
                 applied[k] = 0.0
-            pull_path(s, x, w, y, f, s[s[ITEM_AT] + number], 1.0)
+            pull_path(s, x, w, y, f, s[s[MODEL.ITEM_AT] + number], 1.0)
             generalized_forces(s, w, applied)
             for k in range(size):
                 forces[size * (items * row + number) + k] = applied[k]
-    return OK
+    return OUTCOME.OK

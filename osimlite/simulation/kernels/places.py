@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.forces.vectors import put, vector
-from osimlite.simulation.kernels.layout import CONTACT_AT, CONTACTS, LAWS, NUMBERS, OK, OWN, POSITION_STAGE, STATE_SIZE
+from osimlite.simulation.kernels.layout import ITEM, MODEL, OUTCOME, STAGE
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import direction, station
 
@@ -24,14 +24,14 @@ def contact_places(
         places: filled with the centre of surface 1, its normal, and the centre of surface 2, in ground (k, P, 9).
         count: k.
     """
-    pairs, size = s[CONTACTS], s[STATE_SIZE]
+    pairs, size = s[MODEL.CONTACTS], s[MODEL.STATE_SIZE]
     for k in range(count):
         x = at(vectors, each * rows[k])
-        call(s[LAWS], s, x, w, at(states, size * k), room, POSITION_STAGE)
+        call(s[MODEL.LAWS], s, x, w, at(states, size * k), room, STAGE.POSITION)
         for pair in range(pairs):
-            i, to = at(s, s[s[CONTACT_AT] + pair]), at(places, 9 * (pairs * k + pair))
-            a, one, two = at(x, i[NUMBERS]), i[OWN], i[OWN + 1]
+            i, to = at(s, s[s[MODEL.CONTACT_AT] + pair]), at(places, 9 * (pairs * k + pair))
+            a, one, two = at(x, i[ITEM.NUMBERS]), i[ITEM.OWN], i[ITEM.OWN + 1]
             put(to, 0, station(s, w, one, vector(a, 0)))
             put(to, 3, direction(s, w, one, vector(a, 3)))
             put(to, 6, station(s, w, two, vector(a, 7)))
-    return OK
+    return OUTCOME.OK

@@ -17,29 +17,8 @@ from osimlite.forces.vectors import (
 )
 from osimlite.forces.vectors import turned as turned_by
 from osimlite.simulation.kernels.ball_joint import last_axis
-from osimlite.simulation.kernels.layout import (
-    ARGUMENT_COUNT,
-    ARGUMENTS,
-    AXIS,
-    BALL,
-    CURVATURE,
-    EXTRA,
-    FREEDOM,
-    FREEDOMS,
-    GRADIENT,
-    LINK_WORK,
-    LINKS,
-    MOTION,
-    OPERATION_AT,
-    OPERATION_INTS,
-    OPERATION_WORK,
-    ORIGIN,
-    POINT,
-    TURN,
-    WORK_COLUMN,
-    WORK_LINK,
-    WORK_OPERATION,
-)
+from osimlite.simulation.kernels.layout import LINK_WORK, MODEL, MOTION, OPERATION, OPERATION_WORK
+from osimlite.simulation.kernels.parts import link_work, operation_ints, operation_work
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.pose_record import (
     AXES_AT,
@@ -79,50 +58,53 @@ def bend_joint(m: Fit, y: Floats, link: int, load: Floats, turned: Floats) -> No
 
 def bend_axis(m: Fit, y: Floats, number: int, pull: float) -> None:
     """What the function of one axis makes of the second derivative."""
-    s, size, bend = m.s, m.s[FREEDOMS], at(m.v, m.p[BEND])
+    s, size, bend = m.s, m.s[MODEL.DOFS], at(m.v, m.p[BEND])
     axis = axis_of(m, number)
-    j = at(s, s[OPERATION_AT] + OPERATION_INTS * axis[0])
-    first = s[j[ARGUMENTS]] if j[ARGUMENT_COUNT] > 0 else -1
+    j = operation_ints(s, axis[0])
+    first = s[j[OPERATION.ARGUMENTS]] if j[OPERATION.ARGUMENT_COUNT] > 0 else -1
     if axis[1] >= SLIDES:
-        second, part = s[j[ARGUMENTS] + 1], axis[1] - SLIDES
+        second, part = s[j[OPERATION.ARGUMENTS] + 1], axis[1] - SLIDES
         s1, c1 = sine_cosine(y[first])
         s2, c2 = sine_cosine(y[second])
-        far = pull * m.x[j[EXTRA] + part]
+        far = pull * m.x[j[OPERATION.EXTRA] + part]
         both = far * component((0.0, c1 * s2, s1 * s2), part)
         bend[size * first + first] += far * component((0.0, s1 * c2, -c1 * c2), part)
         bend[size * first + second] += both
         bend[size * second + first] += both
         bend[size * second + second] += far * component((-s2, s1 * c2, -c1 * c2), part)
-    elif axis[1] < 0 and j[FREEDOM] < 0 and j[ARGUMENT_COUNT] == 1 and first >= 0:
-        bend[size * first + first] += pull * m.w[s[WORK_OPERATION] + OPERATION_WORK * axis[0] + CURVATURE]
+    elif axis[1] < 0 and j[OPERATION.DOF] < 0 and j[OPERATION.ARGUMENT_COUNT] == 1 and first >= 0:
+        bend[size * first + first] += pull * operation_work(s, m.w, axis[0])[OPERATION_WORK.CURVATURE]
 
 
 def axis_of(m: Fit, number: int) -> Ints:
     """The operation of an axis, and which part of a ball it is."""
-    return at(m.p, m.p[AXES_AT] + m.s[LINKS] + 1 + 2 * number)
+    return at(m.p, m.p[AXES_AT] + m.s[MODEL.LINKS] + 1 + 2 * number)
 
 
 def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vector]:
     """The motion of a unit of one axis of a link."""
     s, w, axis = m.s, m.w, axis_of(m, number)
-    j, a = at(s, s[OPERATION_AT] + OPERATION_INTS * axis[0]), at(w, s[WORK_OPERATION] + OPERATION_WORK * axis[0])
-    around, center = vector(a, AXIS), vector(a, POINT)
+    j, a = (
+        operation_ints(s, axis[0]),
+        operation_work(s, w, axis[0]),
+    )
+    around, center = vector(a, OPERATION_WORK.AXIS), vector(a, OPERATION_WORK.POINT)
     if axis[1] >= SLIDES:
         part = axis[1] - SLIDES
-        sign = 1.0 if j[MOTION] == BALL else -1.0
+        sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
         return ZERO, times(sign, (a[part], a[3 + part], a[6 + part]))
     if axis[1] >= 0:
-        around = vector(w, s[WORK_COLUMN] + 6 * s[j[ARGUMENTS] + axis[1]])
-        far = elementwise(vector(m.x, j[EXTRA]), last_axis(y, at(s, j[ARGUMENTS])))
+        around = vector(w, s[MODEL.WORK_COLUMN] + 6 * s[j[OPERATION.ARGUMENTS] + axis[1]])
+        far = elementwise(vector(m.x, j[OPERATION.EXTRA]), last_axis(y, at(s, j[OPERATION.ARGUMENTS])))
         center = plus(center, turned_by(a, far))
-    elif j[MOTION] != TURN:
+    elif j[OPERATION.MOTION] != MOTION.TURN:
         return ZERO, around
-    return around, cross(minus(center, vector(w, s[WORK_LINK] + LINK_WORK * link + ORIGIN)), around)
+    return around, cross(minus(center, vector(link_work(s, w, link), LINK_WORK.ORIGIN)), around)
 
 
 def spread(m: Fit, y: Floats, one: int, two: int, amount: float) -> None:
     """Add to the second derivative a multiple of what a pair of axes is to all pairs of coordinates."""
-    size, bend = m.s[FREEDOMS], at(m.v, m.p[BEND])
+    size, bend = m.s[MODEL.DOFS], at(m.v, m.p[BEND])
     for k in range(arguments_of(m, one)):
         first, gain = argument(m, y, one, k)
         if first < 0:
@@ -136,24 +118,24 @@ def spread(m: Fit, y: Floats, one: int, two: int, amount: float) -> None:
 def arguments_of(m: Fit, number: int) -> int:
     """How many coordinates an axis goes by."""
     s, axis = m.s, axis_of(m, number)
-    j = at(s, s[OPERATION_AT] + OPERATION_INTS * axis[0])
+    j = operation_ints(s, axis[0])
     if axis[1] >= SLIDES:
         return 2
-    return 1 if axis[1] >= 0 or j[FREEDOM] >= 0 else j[ARGUMENT_COUNT]
+    return 1 if axis[1] >= 0 or j[OPERATION.DOF] >= 0 else j[OPERATION.ARGUMENT_COUNT]
 
 
 def argument(m: Fit, y: Floats, number: int, k: int) -> tuple[int, float]:
     """A coordinate that an axis goes by, and how far it goes by a unit of it."""
     s, axis = m.s, axis_of(m, number)
-    j = at(s, s[OPERATION_AT] + OPERATION_INTS * axis[0])
+    j = operation_ints(s, axis[0])
     if axis[1] >= SLIDES:
         part = axis[1] - SLIDES
-        s1, c1 = sine_cosine(y[s[j[ARGUMENTS]]])
-        s2, c2 = sine_cosine(y[s[j[ARGUMENTS] + 1]])
+        s1, c1 = sine_cosine(y[s[j[OPERATION.ARGUMENTS]]])
+        s2, c2 = sine_cosine(y[s[j[OPERATION.ARGUMENTS] + 1]])
         slope = (0.0, -c1 * c2, -s1 * c2) if k == 0 else (c2, s1 * s2, -c1 * s2)
-        return s[j[ARGUMENTS] + k], m.x[j[EXTRA] + part] * component(slope, part)
+        return s[j[OPERATION.ARGUMENTS] + k], m.x[j[OPERATION.EXTRA] + part] * component(slope, part)
     if axis[1] >= 0:
-        return s[j[ARGUMENTS] + axis[1]], 1.0
-    if j[FREEDOM] >= 0:
-        return j[FREEDOM], 1.0
-    return s[j[ARGUMENTS] + k], m.w[j[GRADIENT] + k]
+        return s[j[OPERATION.ARGUMENTS] + axis[1]], 1.0
+    if j[OPERATION.DOF] >= 0:
+        return j[OPERATION.DOF], 1.0
+    return s[j[OPERATION.ARGUMENTS] + k], m.w[j[OPERATION.GRADIENT] + k]

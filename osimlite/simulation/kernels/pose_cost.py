@@ -23,28 +23,8 @@ from osimlite.forces.vectors import (
 from osimlite.simulation.kernels.constrained_dynamics import bind
 from osimlite.simulation.kernels.dynamics import momentum
 from osimlite.simulation.kernels.functions import MONOMIALS, several_at, value_at
-from osimlite.simulation.kernels.layout import (
-    ABOVE,
-    CONSTRAINED,
-    END_FREEDOM,
-    FIRST_FREEDOM,
-    FREEDOM_AT,
-    FREEDOM_INTS,
-    FREEDOMS,
-    INERTIA,
-    LAWS,
-    LINK_AT,
-    LINK_INTS,
-    LINK_WORK,
-    LINKS,
-    ORIGIN,
-    PARENT,
-    POSITIONS,
-    VELOCITY_STAGE,
-    WORK_COLUMN,
-    WORK_LINK,
-    WRENCH,
-)
+from osimlite.simulation.kernels.layout import CONSTRAINED, DOF, LINK, LINK_WORK, MODEL, STAGE
+from osimlite.simulation.kernels.parts import link_ints, link_work
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import station
 from osimlite.simulation.kernels.pose_bend import bend_joint, twisted
@@ -81,7 +61,7 @@ from osimlite.simulation.kernels.trigonometry import sine_cosine
 
 def cost(m: Fit, y: Floats) -> float:
     """Cost of a pose, with the gradient and the parts of the second derivative by all free coordinates."""
-    s, w, p, v, size = m.s, m.w, m.p, m.v, m.s[FREEDOMS]
+    s, w, p, v, size = m.s, m.w, m.p, m.v, m.s[MODEL.DOFS]
     look(m, y)
     for k in range(p[BALLS]):
         turn_by_angles(m, y, at(s, p[p[BALL_AT] + k]))
@@ -90,8 +70,11 @@ def cost(m: Fit, y: Floats) -> float:
         slope[k] = 0.0
     for k in range(size * size):
         stiffness[k] = bend[k] = 0.0
-    for link in range(s[LINKS]):
-        here, turned = at(w, s[WORK_LINK] + LINK_WORK * link + INERTIA), at(v, p[TURNED] + 9 * link)
+    for link in range(s[MODEL.LINKS]):
+        here, turned = (
+            at(link_work(s, w, link), LINK_WORK.INERTIA),
+            at(v, p[TURNED] + 9 * link),
+        )
         for k in range(16):
             here[k] = 0.0
         for k in range(9):
@@ -112,12 +95,12 @@ def cost(m: Fit, y: Floats) -> float:
 
 def look(m: Fit, y: Floats) -> None:
     """Where the links are, what each coordinate moves, and the equations."""
-    s, p, v, size = m.s, m.p, m.v, m.s[FREEDOMS]
+    s, p, v, size = m.s, m.p, m.v, m.s[MODEL.DOFS]
     for k in range(size):
         # So that the second derivatives of the functions are those by the coordinates.
         y[size + k] = 1.0
-    call(s[LAWS], s, m.x, m.w, y, m.f, VELOCITY_STAGE)
-    if s[CONSTRAINED] > 0:
+    call(s[MODEL.LAWS], s, m.x, m.w, y, m.f, STAGE.VELOCITY)
+    if s[MODEL.CONSTRAINED] > 0:
         bind(s, m.x, m.w, y, m.f)
         position_errors(s, m.w, at(v, p[ERRORS]))
         rows_by_values(s, m.w, y, at(v, p[ROWS]))
@@ -125,7 +108,7 @@ def look(m: Fit, y: Floats) -> None:
 
 def turn_by_angles(m: Fit, y: Floats, angles: Ints) -> None:
     """Make of the columns of the speeds of a ball those of the rates of its angles."""
-    columns = at(m.w, m.s[WORK_COLUMN])
+    columns = at(m.w, m.s[MODEL.WORK_COLUMN])
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
     one, two, three = at(columns, 6 * angles[0]), at(columns, 6 * angles[1]), at(columns, 6 * angles[2])
@@ -147,9 +130,9 @@ def markers_pull(m: Fit) -> float:
         value += 0.5 * weight * dot(off, off)
         if link < 0:
             continue
-        here = at(w, s[WORK_LINK] + LINK_WORK * link)
-        i, load, turned = at(here, INERTIA), at(here, WRENCH), at(v, p[TURNED] + 9 * link)
-        pull, arm = times(weight, off), minus(point, vector(here, ORIGIN))
+        here = link_work(s, w, link)
+        i, load, turned = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH), at(v, p[TURNED] + 9 * link)
+        pull, arm = times(weight, off), minus(point, vector(here, LINK_WORK.ORIGIN))
         a, b, c = arm
         mx, my, mz = times(weight, arm)
         i[0] += weight
@@ -173,14 +156,14 @@ def markers_pull(m: Fit) -> float:
 
 def gather(m: Fit, y: Floats) -> None:
     """Gradient and second derivative by the degrees of freedom, inwards from the leaves."""
-    s, w, p, v, size = m.s, m.w, m.p, m.v, m.s[FREEDOMS]
-    freedoms, columns = at(s, s[FREEDOM_AT]), at(w, s[WORK_COLUMN])
+    s, w, p, v, size = m.s, m.w, m.p, m.v, m.s[MODEL.DOFS]
+    freedoms, columns = at(s, s[MODEL.DOF_AT]), at(w, s[MODEL.WORK_COLUMN])
     slope, stiffness, bend = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND])
-    for link in range(s[LINKS] - 1, -1, -1):
-        j, here = at(s, s[LINK_AT] + LINK_INTS * link), at(w, s[WORK_LINK] + LINK_WORK * link)
-        i, load, turned = at(here, INERTIA), at(here, WRENCH), at(v, p[TURNED] + 9 * link)
+    for link in range(s[MODEL.LINKS] - 1, -1, -1):
+        j, here = link_ints(s, link), link_work(s, w, link)
+        i, load, turned = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH), at(v, p[TURNED] + 9 * link)
         if i[0] > 0.0 or i[4] > 0.0:
-            for freedom in range(j[FIRST_FREEDOM], j[END_FREEDOM]):
+            for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
                 c = at(columns, 6 * freedom)
                 turn, shift = vector(c, 0), vector(c, 3)
                 slope[freedom] += dot(turn, vector(load, 0)) + dot(shift, vector(load, 3))
@@ -191,23 +174,23 @@ def gather(m: Fit, y: Floats) -> None:
                     c = at(columns, 6 * k)
                     entry = dot(vector(c, 0), angular) + dot(vector(c, 3), linear)
                     stiffness[size * freedom + k] = stiffness[size * k + freedom] = entry
-                    if k < j[FIRST_FREEDOM]:
+                    if k < j[LINK.FIRST_DOF]:
                         bend[size * freedom + k] = bend[size * k + freedom] = dot(vector(c, 0), carried)
-                    k = freedoms[FREEDOM_INTS * k + ABOVE]
+                    k = freedoms[DOF.SIZE * k + DOF.ABOVE]
             bend_joint(m, y, link, load, turned)
-        if j[PARENT] >= 0:
-            above = at(w, s[WORK_LINK] + LINK_WORK * j[PARENT] + INERTIA)
+        if j[LINK.PARENT] >= 0:
+            above = at(link_work(s, w, j[LINK.PARENT]), LINK_WORK.INERTIA)
             # The wrench stands behind the inertia.
             for k in range(16):
                 above[k] += i[k]
-            above = at(v, p[TURNED] + 9 * j[PARENT])
+            above = at(v, p[TURNED] + 9 * j[LINK.PARENT])
             for k in range(9):
                 above[k] += turned[k]
 
 
 def follow_couplers(m: Fit, y: Floats) -> None:
     """Make of the derivatives, and of the equations, those by the coordinates that depend on no others."""
-    p, v, size = m.p, m.v, m.s[FREEDOMS]
+    p, v, size = m.p, m.v, m.s[MODEL.DOFS]
     slope, stiffness, bend, rows = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND]), at(v, p[ROWS])
     gradient, rates = at(v, p[ROOM]), at(v, p[ROOM] + size)
     for k in range(size):
@@ -236,7 +219,7 @@ def follow_couplers(m: Fit, y: Floats) -> None:
 
 def equations_of(m: Fit) -> int:
     """How many equations bind the positions."""
-    return m.s[m.s[CONSTRAINED] + POSITIONS] if m.s[CONSTRAINED] > 0 else 0
+    return m.s[m.s[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS] if m.s[MODEL.CONSTRAINED] > 0 else 0
 
 
 def coupled(m: Fit, i: Ints, y: Floats, gradient: Floats, rates: Floats) -> tuple[float, float]:

@@ -11,10 +11,7 @@ from __future__ import annotations
 from math import floor, inf, pi
 
 from osimlite.forces.vectors import put
-from osimlite.simulation.kernels.layout import (
-    FREEDOMS,
-    OK,
-)
+from osimlite.simulation.kernels.layout import MODEL, OUTCOME
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import station
 from osimlite.simulation.kernels.pose_bonds import bend_equations, forget_bends, settle
@@ -98,7 +95,7 @@ def fit_frames(
         count: of the frames.
     """
     m = Fit(s, x, w, f, p, c, v)
-    size, markers, sensors = s[FREEDOMS], p[MARKERS], p[SENSORS]
+    size, markers, sensors = s[MODEL.DOFS], p[MARKERS], p[SENSORS]
     width, given = size + 3 * (markers + sensors) + 3, 3 * markers + 9 * sensors + p[GOALS] + p[HELD]
     for number in range(count):
         to = at(found, width * number)
@@ -114,12 +111,12 @@ def fit_frames(
             put(to, size + 3 * (markers + k), turn_of(m, k))
         end = at(to, size + 3 * (markers + sensors))
         end[0], end[1], end[2] = value, float(steps), status
-    return OK
+    return OUTCOME.OK
 
 
 def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     """Bring a pose to the best of a frame: its cost, the count of the steps, what became of it."""
-    v, p, size = m.v, m.p, m.s[FREEDOMS]
+    v, p, size = m.v, m.p, m.s[MODEL.DOFS]
     history = at(v, p[HISTORY])
     kept, last, trial = int(history[0]), at(history, 1), at(v, p[TRIAL])
     seen = weigh(m)
@@ -192,7 +189,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
 
 def note_pattern(m: Fit, y: Floats) -> None:
     """If other things are seen than in the frame before, find out whether poses look alike, and what moves nothing."""
-    p, v, size = m.p, m.v, m.s[FREEDOMS]
+    p, v, size = m.p, m.v, m.s[MODEL.DOFS]
     count = p[MARKERS] + p[SENSORS] + p[GOALS]
     weights, pattern, is_new = at(v, p[WEIGHTS]), at(v, p[PATTERN]), False
     for k in range(count):
@@ -217,7 +214,7 @@ def descend_again(
     m: Fit, start: Floats, y: Floats, value: float, status: float, damping: float, lightest: float
 ) -> tuple[float, int, float]:
     """Look for a better pose than the best so far, whose cost is known, from another start; keep the better one."""
-    size = m.s[FREEDOMS]
+    size = m.s[MODEL.DOFS]
     best, trial = at(start, size), at(m.v, m.p[TRIAL])
     copy(size, y, best)
     copy(size, start, trial)
@@ -236,7 +233,7 @@ def come_round(
 ) -> tuple[float, int, float]:
     """Look for a better pose with each angle that is at an end of its range at the other one; keep the best."""
     steps = 0
-    for number in range(m.s[FREEDOMS]):
+    for number in range(m.s[MODEL.DOFS]):
         if go_round(m, y, start, number):
             value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
             steps += more
@@ -276,7 +273,7 @@ def descend(
     m: Fit, start: Floats, y: Floats, value: float, damping: float, lightest: float
 ) -> tuple[float, int, float]:
     """From a pose whose cost and derivatives are known to the best nearby; fills y, and leaves marks where it ends."""
-    p, v, size = m.p, m.v, m.s[FREEDOMS]
+    p, v, size = m.p, m.v, m.s[MODEL.DOFS]
     step = at(v, p[STEP])
     before, bends, status = inf, damping == LIGHTEST, STUCK
     copy(size, start, y)

@@ -26,7 +26,8 @@ from osimlite.forces.vectors import (
     times,
     vector,
 )
-from osimlite.simulation.kernels.layout import INERTIA, LINK_WORK, WORK_LINK, WRENCH
+from osimlite.simulation.kernels.layout import LINK_WORK
+from osimlite.simulation.kernels.parts import link_work
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.points import direction
 from osimlite.simulation.kernels.pose_record import (
@@ -60,8 +61,8 @@ def sensors_turn(m: Fit) -> float:
         value += 0.5 * weight * square
         if link < 0:
             continue
-        here = at(w, s[WORK_LINK] + LINK_WORK * link)
-        i, load, turned = at(here, INERTIA), at(here, WRENCH), at(v, p[TURNED] + 9 * link)
+        here = link_work(s, w, link)
+        i, load, turned = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH), at(v, p[TURNED] + 9 * link)
         x, y, z = times(weight * evenness(sqrt(square)), off)
         a, b, c = off
         i[4] += weight - (y * b + z * c)

@@ -5,18 +5,7 @@ from __future__ import annotations
 from math import nan
 
 from osimlite.simulation.kernels.dynamics import clear_wrenches, generalized_forces
-from osimlite.simulation.kernels.layout import (
-    FREEDOMS,
-    ITEM_AT,
-    ITEMS,
-    LAW,
-    LAWS,
-    OK,
-    STATE_SIZE,
-    TIME,
-    VELOCITY_STAGE,
-    WORK_SIZE,
-)
+from osimlite.simulation.kernels.layout import ITEM, MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.kernels.paths import pull_path
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
@@ -38,22 +27,29 @@ def look(
             are looked at, and these places: of w, and behind it of f.
         found: what stands at the places, state by state.
     """
-    size, room, count, moving, law, looked = s[STATE_SIZE], s[WORK_SIZE], order[0], order[1], order[2], order[3]
+    size, room, count, moving, law, looked = (
+        s[MODEL.STATE_SIZE],
+        s[MODEL.WORK_SIZE],
+        order[0],
+        order[1],
+        order[2],
+        order[3],
+    )
     for number in range(count):
         given = at(states, (1 + size + moving) * number)
-        w[TIME] = given[0]
+        w[WORK.TIME] = given[0]
         for k in range(size):
             y[k] = given[1 + k]
         for k in range(moving):
-            f[s[FREEDOMS] + k] = given[1 + size + k]
+            f[s[MODEL.DOFS] + k] = given[1 + size + k]
         status = call(law, s, x, w, y, f, stage)
-        if status != OK:
+        if status != OUTCOME.OK:
             return status
         row = at(found, looked * number)
         for k in range(looked):
             place = order[4 + k]
             row[k] = w[place] if place < room else f[place - room]
-    return OK
+    return OUTCOME.OK
 
 
 def push_each(
@@ -74,18 +70,18 @@ def push_each(
         found: generalized forces that are missing (n,), and of each actuator those that it gives (n,) and what it pulls
             with, state by state.
     """
-    size, freedoms, count, actuators = s[STATE_SIZE], s[FREEDOMS], order[0], order[1]
+    size, freedoms, count, actuators = s[MODEL.STATE_SIZE], s[MODEL.DOFS], order[0], order[1]
     applied = at(f, freedoms)
     for number in range(count):
         given = at(states, (1 + size + freedoms) * number)
         row = at(found, (freedoms + actuators * (freedoms + 1)) * number)
-        w[TIME] = given[0]
+        w[WORK.TIME] = given[0]
         for k in range(size):
             y[k] = given[1 + k]
         for k in range(freedoms):
             applied[k] = given[1 + size + k]
         status = call(law, s, x, w, y, f, 0)
-        if status != OK:
+        if status != OUTCOME.OK:
             return status
         for k in range(freedoms):
             row[k] = applied[k]
@@ -100,14 +96,14 @@ def push_each(
                 pull_path(s, x, w, y, f, own[2], w[own[3]])
             else:
                 w[own[1]] = 1.0
-                status = call(s[own[0] + LAW], s, x, w, y, f, own[0])
+                status = call(s[own[0] + ITEM.LAW], s, x, w, y, f, own[0])
                 w[own[1]], to[freedoms] = 0.0, 1.0
-                if status != OK:
+                if status != OUTCOME.OK:
                     return status
             generalized_forces(s, w, applied)
             for k in range(freedoms):
                 to[k] = applied[k]
-    return OK
+    return OUTCOME.OK
 
 
 def watch(
@@ -130,24 +126,24 @@ def watch(
     Returns:
         OK, or what the kernel of an item said last that is something else.
     """
-    size, looked, cleared = s[STATE_SIZE], order[0], order[1]
+    size, looked, cleared = s[MODEL.STATE_SIZE], order[0], order[1]
     places, clears = at(order, 2), at(order, 2 + looked)
     items = at(order, 2 + looked + cleared)
-    said = OK
+    said = OUTCOME.OK
     for number in range(count):
         for k in range(size):
             y[k] = states[size * number + k]
         for k in range(cleared):
             w[clears[k]] = 0.0
-        status = call(s[LAWS], s, x, w, y, f, VELOCITY_STAGE)
+        status = call(s[MODEL.LAWS], s, x, w, y, f, STAGE.VELOCITY)
         first, end = items[number], items[number] + 1
         if first < 0:
-            first, end = 0, s[ITEMS]
+            first, end = 0, s[MODEL.ITEMS]
         for k in range(first, end):
-            if status == OK:
-                item = s[s[ITEM_AT] + k]
-                status = call(s[item + LAW], s, x, w, y, f, item)
+            if status == OUTCOME.OK:
+                item = s[s[MODEL.ITEM_AT] + k]
+                status = call(s[item + ITEM.LAW], s, x, w, y, f, item)
         for k in range(looked):
-            found[looked * number + k] = w[places[k]] if status == OK else nan
-        said = said if status == OK else status
+            found[looked * number + k] = w[places[k]] if status == OUTCOME.OK else nan
+        said = said if status == OUTCOME.OK else status
     return said

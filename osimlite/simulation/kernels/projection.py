@@ -11,31 +11,7 @@ from __future__ import annotations
 from math import inf, sqrt
 
 from osimlite.simulation.kernels.constrained_dynamics import bind
-from osimlite.simulation.kernels.layout import (
-    BALL_AT,
-    BALLS,
-    CONSTRAINED,
-    CONSTRAINT_AT,
-    CONSTRAINTS,
-    END_POSITION,
-    EQUATIONS,
-    FAR,
-    FIRST_EQUATION,
-    FREEDOMS,
-    LAWS,
-    LOCKS,
-    OK,
-    POSITIONS,
-    SCRATCH,
-    VELOCITY_STAGE,
-    WORK_ERRORS,
-    WORK_FACTOR,
-    WORK_KEPT,
-    WORK_RATES,
-    WORK_ROWS,
-    WORK_SYSTEM,
-    WORK_TRIAL,
-)
+from osimlite.simulation.kernels.layout import CONSTRAINED, CONSTRAINT, MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.kernels.least_squares import factored, solved
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.trigonometry import sine_cosine
@@ -64,17 +40,17 @@ def project(s: Ints, x: Floats, w: Floats, y: Floats, off: Floats, has_errors: i
     Returns:
         OK if they hold then.
     """
-    size, h = s[FREEDOMS], at(s, s[CONSTRAINED])
-    tolerance, limit = w[SCRATCH], w[SCRATCH + 1]
-    trial = at(w, h[WORK_TRIAL])
+    size, h = s[MODEL.DOFS], at(s, s[MODEL.CONSTRAINED])
+    tolerance, limit = w[WORK.SCRATCH], w[WORK.SCRATCH + 1]
+    trial = at(w, h[CONSTRAINED.WORK_TRIAL])
     for k in range(2 * size):
         trial[k] = y[k]
     status = bound(s, x, w, trial)
-    if status == OK:
+    if status == OUTCOME.OK:
         status = project_values(s, x, w, trial, off, has_errors, tolerance, limit)
-    if status == OK:
+    if status == OUTCOME.OK:
         status = project_speeds(s, w, trial, at(off, size), has_errors, tolerance, limit)
-    if status == OK:
+    if status == OUTCOME.OK:
         for k in range(2 * size):
             y[k] = trial[k]
     return status
@@ -82,9 +58,9 @@ def project(s: Ints, x: Floats, w: Floats, y: Floats, off: Floats, has_errors: i
 
 def bound(s: Ints, x: Floats, w: Floats, y: Floats) -> int:
     """All equations at a state."""
-    f = at(w, s[s[CONSTRAINED] + WORK_TRIAL] + 2 * s[FREEDOMS])
-    status = call(s[LAWS], s, x, w, y, f, VELOCITY_STAGE)
-    if status == OK:
+    f = at(w, s[s[MODEL.CONSTRAINED] + CONSTRAINED.WORK_TRIAL] + 2 * s[MODEL.DOFS])
+    status = call(s[MODEL.LAWS], s, x, w, y, f, STAGE.VELOCITY)
+    if status == OUTCOME.OK:
         bind(s, x, w, y, f)
     return status
 
@@ -93,15 +69,15 @@ def project_values(
     s: Ints, x: Floats, w: Floats, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float
 ) -> int:
     """Change the values of a state whose equations are known, and the errors with them; the equations follow."""
-    size, h = s[FREEDOMS], at(s, s[CONSTRAINED])
-    count, kept, factor = h[POSITIONS], at(w, h[WORK_KEPT]), at(w, h[WORK_FACTOR])
-    errors = at(w, h[WORK_SYSTEM])
-    room, step, following = at(errors, count), at(errors, 2 * count), at(w, h[WORK_TRIAL] + 4 * size)
+    size, h = s[MODEL.DOFS], at(s, s[MODEL.CONSTRAINED])
+    count, kept, factor = h[CONSTRAINED.POSITIONS], at(w, h[CONSTRAINED.WORK_KEPT]), at(w, h[CONSTRAINED.WORK_FACTOR])
+    errors = at(w, h[CONSTRAINED.WORK_SYSTEM])
+    room, step, following = at(errors, count), at(errors, 2 * count), at(w, h[CONSTRAINED.WORK_TRIAL] + 4 * size)
     norm = position_errors(s, w, errors)
     if norm <= tolerance:
-        return OK
+        return OUTCOME.OK
     if not norm <= limit:
-        return FAR
+        return OUTCOME.FAR
     for iteration in range(ITERATIONS):
         rows_by_values(s, w, y, kept)
         for k in range(count * size):
@@ -111,7 +87,7 @@ def project_values(
         for k in range(size):
             following[k], following[size + k] = y[k] - step[k], y[size + k]
         before, norm = norm, inf
-        if bound(s, x, w, following) == OK:
+        if bound(s, x, w, following) == OUTCOME.OK:
             norm = position_errors(s, w, errors)
         if iteration > 0 and not norm <= before:
             norm = before
@@ -121,7 +97,7 @@ def project_values(
         if norm <= max(OVERSHOOT * tolerance, FINEST):
             break
     if not norm <= tolerance:
-        return FAR
+        return OUTCOME.FAR
     if has_errors > 0:
         across(s, count, kept, factor, off, errors, room, step)
         for k in range(size):
@@ -131,15 +107,15 @@ def project_values(
 
 def project_speeds(s: Ints, w: Floats, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float) -> int:
     """Change the speeds of a state whose equations are known, and their errors with them."""
-    size, h = s[FREEDOMS], at(s, s[CONSTRAINED])
-    count, rows, factor = h[EQUATIONS], at(w, h[WORK_ROWS]), at(w, h[WORK_FACTOR])
-    errors, scales, u = at(w, h[WORK_SYSTEM]), at(w, h[WORK_TRIAL] + 4 * size), at(y, size)
+    size, h = s[MODEL.DOFS], at(s, s[MODEL.CONSTRAINED])
+    count, rows, factor = h[CONSTRAINED.EQUATIONS], at(w, h[CONSTRAINED.WORK_ROWS]), at(w, h[CONSTRAINED.WORK_FACTOR])
+    errors, scales, u = at(w, h[CONSTRAINED.WORK_SYSTEM]), at(w, h[CONSTRAINED.WORK_TRIAL] + 4 * size), at(y, size)
     room, step = at(errors, count), at(errors, 2 * count)
     norm = speed_errors(s, w, u, errors)
     if norm <= tolerance:
-        return OK
+        return OUTCOME.OK
     if not norm <= limit:
-        return FAR
+        return OUTCOME.FAR
     for k in range(size):
         scales[k] = max(abs(u[k]), 1.0)
     for i in range(count):
@@ -155,12 +131,12 @@ def project_speeds(s: Ints, w: Floats, y: Floats, off: Floats, has_errors: int, 
         if norm <= max(OVERSHOOT * tolerance, FINEST):
             break
     if not norm <= tolerance:
-        return FAR
+        return OUTCOME.FAR
     if has_errors > 0:
         across(s, count, rows, factor, off, errors, room, step)
         for k in range(size):
             off[k] -= scales[k] * step[k]
-    return OK
+    return OUTCOME.OK
 
 
 def across(
@@ -174,7 +150,7 @@ def across(
     found: Floats,
 ) -> None:
     """What of some errors lies across equations, of which the factor is known."""
-    size = s[FREEDOMS]
+    size = s[MODEL.DOFS]
     for i in range(count):
         values[i] = 0.0
         for k in range(size):
@@ -184,41 +160,41 @@ def across(
 
 def position_errors(s: Ints, w: Floats, errors: Floats) -> float:
     """The errors of the positions one after the other, and their root mean square."""
-    h, count, total = at(s, s[CONSTRAINED]), 0, 0.0
-    for number in range(h[CONSTRAINTS]):
-        constraint = at(s, s[h[CONSTRAINT_AT] + number])
-        for row in range(constraint[FIRST_EQUATION], constraint[END_POSITION]):
-            errors[count] = w[h[WORK_ERRORS] + row]
+    h, count, total = at(s, s[MODEL.CONSTRAINED]), 0, 0.0
+    for number in range(h[CONSTRAINED.CONSTRAINTS]):
+        constraint = at(s, s[h[CONSTRAINED.CONSTRAINT_AT] + number])
+        for row in range(constraint[CONSTRAINT.FIRST_EQUATION], constraint[CONSTRAINT.END_POSITION]):
+            errors[count] = w[h[CONSTRAINED.WORK_ERRORS] + row]
             total += errors[count] * errors[count]
             count += 1
-    return sqrt(total / max(count + h[LOCKS], 1))
+    return sqrt(total / max(count + h[CONSTRAINED.LOCKS], 1))
 
 
 def speed_errors(s: Ints, w: Floats, u: Floats, errors: Floats) -> float:
     """The errors of the speeds, and their root mean square."""
-    h, size, total = at(s, s[CONSTRAINED]), s[FREEDOMS], 0.0
-    rows, rates = at(w, h[WORK_ROWS]), at(w, h[WORK_RATES])
-    for i in range(h[EQUATIONS]):
+    h, size, total = at(s, s[MODEL.CONSTRAINED]), s[MODEL.DOFS], 0.0
+    rows, rates = at(w, h[CONSTRAINED.WORK_ROWS]), at(w, h[CONSTRAINED.WORK_RATES])
+    for i in range(h[CONSTRAINED.EQUATIONS]):
         error = -rates[i]
         for k in range(size):
             error += rows[size * i + k] * u[k]
         errors[i] = error
         total += error * error
-    return sqrt(total / max(h[EQUATIONS] + h[LOCKS], 1))
+    return sqrt(total / max(h[CONSTRAINED.EQUATIONS] + h[CONSTRAINED.LOCKS], 1))
 
 
 def rows_by_values(s: Ints, w: Floats, y: Floats, rows: Floats) -> None:
     """Derivatives of the errors of the positions by the coordinates."""
-    h, size, count = at(s, s[CONSTRAINED]), s[FREEDOMS], 0
-    for number in range(h[CONSTRAINTS]):
-        constraint = at(s, s[h[CONSTRAINT_AT] + number])
-        for i in range(constraint[FIRST_EQUATION], constraint[END_POSITION]):
-            row, given = at(rows, size * count), at(w, h[WORK_ROWS] + size * i)
+    h, size, count = at(s, s[MODEL.CONSTRAINED]), s[MODEL.DOFS], 0
+    for number in range(h[CONSTRAINED.CONSTRAINTS]):
+        constraint = at(s, s[h[CONSTRAINED.CONSTRAINT_AT] + number])
+        for i in range(constraint[CONSTRAINT.FIRST_EQUATION], constraint[CONSTRAINT.END_POSITION]):
+            row, given = at(rows, size * count), at(w, h[CONSTRAINED.WORK_ROWS] + size * i)
             for k in range(size):
                 row[k] = given[k]
             count += 1
-    for number in range(h[BALLS]):
-        a = at(s, s[h[BALL_AT] + number])
+    for number in range(h[CONSTRAINED.BALLS]):
+        a = at(s, s[h[CONSTRAINED.BALL_AT] + number])
         s1, c1 = sine_cosine(y[a[0]])
         s2, c2 = sine_cosine(y[a[1]])
         for i in range(count):

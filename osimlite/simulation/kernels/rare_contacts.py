@@ -7,16 +7,7 @@ from math import inf
 from osimlite.forces.ellipsoid_contact import Axes, ellipsoid_ellipsoid, half_space_ellipsoid
 from osimlite.forces.vectors import dot, minus, put, vector
 from osimlite.simulation.kernels.contacts import press
-from osimlite.simulation.kernels.layout import (
-    CONTACT_AT,
-    DEPTH_OF,
-    FIRST_CONTACT,
-    LAW,
-    NUMBERS,
-    OK,
-    OWN,
-    RECORD,
-)
+from osimlite.simulation.kernels.layout import CONTACT_WORK, ITEM, MODEL, OUTCOME
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import direction, station
 
@@ -24,28 +15,28 @@ from osimlite.simulation.kernels.points import direction, station
 def touch_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """An ellipsoid on a half space; after the numbers of a pair stand the directions of its axes and half axes."""
     i = at(s, item)
-    one, two, p = i[OWN], i[OWN + 1], at(x, i[NUMBERS])
+    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(x, i[ITEM.NUMBERS])
     o, n = station(s, w, one, vector(p, 0)), direction(s, w, one, vector(p, 3))
     center = station(s, w, two, vector(p, 7))
     d, radius, point = half_space_ellipsoid(o, n, center, axes(s, w, two, at(p, 18)), vector(p, 27), p[12])
     if d > 0.0:
         press(s, x, w, item, d, radius, n, point)
-    return OK
+    return OUTCOME.OK
 
 
 def touch_ellipsoids(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """Two ellipsoids, of which one may be a sphere; axes and half axes of both stand after the numbers of a pair."""
     i = at(s, item)
-    one, two, p = i[OWN], i[OWN + 1], at(x, i[NUMBERS])
+    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(x, i[ITEM.NUMBERS])
     a, b = station(s, w, one, vector(p, 0)), station(s, w, two, vector(p, 7))
     way = minus(b, a)
     if dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
-        return OK
+        return OUTCOME.OK
     axes1, axes2 = axes(s, w, one, at(p, 18)), axes(s, w, two, at(p, 30))
     d, radius, n, point = ellipsoid_ellipsoid(a, axes1, vector(p, 27), b, axes2, vector(p, 39), p[12])
     if d > 0.0:
         press(s, x, w, item, d, radius, n, point)
-    return OK
+    return OUTCOME.OK
 
 
 def axes(s: Ints, w: Floats, link: int, p: Floats) -> Axes:
@@ -62,7 +53,13 @@ def early_return(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int)
     farthest apart (largest sum of distances from their mean), from the surface that begins first.
     """
     i = at(s, item)
-    count, pairs, links, p, room = i[OWN], i[OWN + 1], at(i, OWN + 2), at(x, i[NUMBERS]), at(w, i[RECORD])
+    count, pairs, links, p, room = (
+        i[ITEM.OWN],
+        i[ITEM.OWN + 1],
+        at(i, ITEM.OWN + 2),
+        at(x, i[ITEM.NUMBERS]),
+        at(w, i[ITEM.RECORD]),
+    )
     centers, start, order = room, at(room, 3 * count), at(room, 4 * count)
     for k in range(count):
         put(centers, 3 * k, station(s, w, links[k], vector(p, 4 * k)))
@@ -93,9 +90,9 @@ def early_return(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int)
                 break
             if near(at(centers, 3 * one), at(centers, 3 * two), p[4 * one + 3], p[4 * two + 3]):
                 pair = pair_of(at(links, count), pairs, one, two)
-                if pair >= 0 and separates(s, x, w, y, f, s[s[CONTACT_AT] + i[FIRST_CONTACT] + pair]):
-                    return OK
-    return OK
+                if pair >= 0 and separates(s, x, w, y, f, s[s[MODEL.CONTACT_AT] + i[ITEM.FIRST_CONTACT] + pair]):
+                    return OUTCOME.OK
+    return OUTCOME.OK
 
 
 def near(a: Floats, b: Floats, one: float, two: float) -> bool:
@@ -117,6 +114,6 @@ def pair_of(surfaces: Ints, pairs: int, one: int, two: int) -> int:
 
 def separates(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, part: int) -> bool:
     """Compute one contact; whether it touches and does not push."""
-    call(s[part + LAW], s, x, w, y, f, part)
-    result = at(w, s[part + RECORD])
-    return bool(result[DEPTH_OF] > 0.0 and result[0] == 0.0 and result[1] == 0.0 and result[2] == 0.0)
+    call(s[part + ITEM.LAW], s, x, w, y, f, part)
+    result = at(w, s[part + ITEM.RECORD])
+    return bool(result[CONTACT_WORK.DEPTH] > 0.0 and result[0] == 0.0 and result[1] == 0.0 and result[2] == 0.0)

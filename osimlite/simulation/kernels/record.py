@@ -7,18 +7,7 @@ from typing import NamedTuple
 
 from osimlite.forces.vectors import dot, vector
 from osimlite.simulation.kernels.error_control import projected
-from osimlite.simulation.kernels.layout import (
-    CONSTRAINED,
-    CONTACT_WORK,
-    CONTACTS,
-    FORCE_STAGE,
-    LAWS,
-    POSITION_STAGE,
-    STATE_SIZE,
-    TIME,
-    WORK_CONTACT,
-    WORK_STATE,
-)
+from osimlite.simulation.kernels.layout import CONTACT_WORK, MODEL, STAGE, WORK
 from osimlite.simulation.kernels.method import ACCEPTED
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 from osimlite.simulation.kernels.points import station
@@ -89,23 +78,23 @@ class Motion(NamedTuple):
 
 def evaluated(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int:
     """Evaluate at a time."""
-    m.w[TIME] = t
-    return call(m.s[LAWS], m.s, m.x, m.w, y, f, stage)
+    m.w[WORK.TIME] = t
+    return call(m.s[MODEL.LAWS], m.s, m.x, m.w, y, f, stage)
 
 
 def inside(
     m: Motion, t0: float, y0: Floats, f0: Floats, t1: float, y1: Floats, f1: Floats, t: float, y: Floats
 ) -> None:
     """State y at a time within a step, where the constraints hold if it can be moved there."""
-    cubic(m.s[STATE_SIZE], t0, y0, f0, t1, y1, f1, t, y)
-    if m.s[CONSTRAINED] > 0:
+    cubic(m.s[MODEL.STATE_SIZE], t0, y0, f0, t1, y1, f1, t, y)
+    if m.s[MODEL.CONSTRAINED] > 0:
         projected(m.s, m.x, m.w, t, y, y, 0, m.w[m.sizes[METHOD_AT] + ACCEPTED] / 10.0, inf)
 
 
 def note_peaks(m: Motion, t: float) -> None:
     """Keep the largest forces."""
-    for pair in range(m.s[CONTACTS]):
-        c, peak = at(m.w, m.s[WORK_CONTACT] + CONTACT_WORK * pair), at(m.peaks, 2 * pair)
+    for pair in range(m.s[MODEL.CONTACTS]):
+        c, peak = at(m.w, m.s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair), at(m.peaks, 2 * pair)
         size = sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
         if size > peak[0]:
             peak[0], peak[1] = size, t
@@ -113,21 +102,25 @@ def note_peaks(m: Motion, t: float) -> None:
 
 def note_step(m: Motion, t: float, y: Floats, f: Floats) -> None:
     """Write a step into the log."""
-    size, row = m.s[STATE_SIZE], m.counts[LOGGED]
+    size, row = m.s[MODEL.STATE_SIZE], m.counts[LOGGED]
     log = at(m.log, (1 + 2 * size) * row)
     log[0] = t
     copy(size, y, at(log, 1))
     copy(size, f, at(log, 1 + size))
-    for pair in range(m.s[CONTACTS]):
-        copy(3, at(m.w, m.s[WORK_CONTACT] + CONTACT_WORK * pair), at(m.forces, 3 * (m.s[CONTACTS] * row + pair)))
+    for pair in range(m.s[MODEL.CONTACTS]):
+        copy(
+            3,
+            at(m.w, m.s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair),
+            at(m.forces, 3 * (m.s[MODEL.CONTACTS] * row + pair)),
+        )
     m.counts[LOGGED] += 1
 
 
 def levels_at(m: Motion, y: Floats, levels: Floats) -> None:
     """Fill levels: of each contact 1 if it pushes, else -1; of each watch how far it is above its level."""
-    pairs = m.s[CONTACTS]
+    pairs = m.s[MODEL.CONTACTS]
     for pair in range(pairs):
-        c = at(m.w, m.s[WORK_CONTACT] + CONTACT_WORK * pair)
+        c = at(m.w, m.s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
         levels[pair] = 1.0 if c[0] != 0.0 or c[1] != 0.0 or c[2] != 0.0 else -1.0
     for number in range(m.sizes[WATCHES]):
         watch, a = at(m.watches, 3 * number), at(m.levels, 7 * number)
@@ -152,9 +145,9 @@ def note_events(
 ) -> float:
     """Write down what began and ended within a step; returns the time at which the run is to stop, or infinity."""
     counts, events = m.counts, m.events
-    size, pairs = m.s[STATE_SIZE], m.s[CONTACTS]
+    size, pairs = m.s[MODEL.STATE_SIZE], m.s[MODEL.CONTACTS]
     stop, first, total, event = inf, counts[EVENTS], pairs + m.sizes[WATCHES], m.sizes[EVENT]
-    ya = at(m.w, m.s[WORK_STATE] + 4 * size)
+    ya = at(m.w, m.s[MODEL.WORK_STATE] + 4 * size)
     fa, result = at(ya, size), at(after, total)
     for number in range(total):
         rises = after[number] > 0.0
@@ -167,7 +160,7 @@ def note_events(
                 break
             inside(m, t0, y0, f0, t1, y1, f1, middle, ya)
             touch = number < pairs or m.watches[3 * (number - pairs)] == TOUCH
-            evaluated(m, middle, ya, fa, FORCE_STAGE if touch else POSITION_STAGE)
+            evaluated(m, middle, ya, fa, STAGE.FORCE if touch else STAGE.POSITION)
             levels_at(m, ya, result)
             if (result[number] > 0.0) == rises:
                 high = middle

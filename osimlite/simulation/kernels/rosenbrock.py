@@ -11,7 +11,7 @@ from math import inf
 
 from osimlite.simulation.kernels.condensation import condense, correct, linearise
 from osimlite.simulation.kernels.error_control import step_error
-from osimlite.simulation.kernels.layout import ACCELERATION_STAGE, LAWS, OK, STATE_SIZE, TIME, WORK_STATE
+from osimlite.simulation.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.kernels.method import (
     ACCEPTED,
     ERRORS,
@@ -75,10 +75,10 @@ SAFETY, SHRINK, GROW, WORTH = 0.9, 0.2, 5.0, 1.1
 
 def rosenbrock(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> int:
     """Try one step from y0, behind which its derivative stands, to y1."""
-    size = s[STATE_SIZE]
+    size = s[MODEL.STATE_SIZE]
     h = at(w, place)
     stages, room = at(h, HEAD), at(h, HEAD + STATES * size)
-    errors, f1 = at(w, s[WORK_STATE] + ERRORS * size), at(y1, size)
+    errors, f1 = at(w, s[MODEL.WORK_STATE] + ERRORS * size), at(y1, size)
     t0, accuracy, step = h[REACHED], h[ACCEPTED], h[NEXT_STEP]
     h[EVALUATED], h[HAS_DERIVATIVE] = STAGES - 1.0, 0.0
     t1 = h[LAST_TIME] if h[LAST_TIME] <= t0 + 1.001 * step else t0 + step
@@ -86,9 +86,9 @@ def rosenbrock(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int
     step = t1 - t0
     c, error = DIAGONAL * step, inf
     if h[IS_NEW] == 0.0:
-        w[TIME] = t0
+        w[WORK.TIME] = t0
         copy(size, y0, y1)
-        h[IS_NEW] = 1.0 if linearise(s, x, w, y1, f1, room) == OK else 0.0
+        h[IS_NEW] = 1.0 if linearise(s, x, w, y1, f1, room) == OUTCOME.OK else 0.0
     if h[IS_NEW] > 0.0 and condense(s, c, room) and staged(s, x, w, t0, step, c, y0, y1, stages, room):
         for k in range(size):
             y1[k], errors[k] = y0[k], 0.0
@@ -100,18 +100,18 @@ def rosenbrock(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int
     if not error <= accuracy:
         # Near the resolution of the time, the step was longer than it was to be.
         h[NEXT_STEP] = min(max(factor, SHRINK) * step, SAFETY * h[NEXT_STEP])
-        return OK
+        return OUTCOME.OK
     h[REACHED], h[IS_NEW] = t1, 0.0
     if factor < 1.0 or (factor >= WORTH and not cut):
         h[NEXT_STEP] = min(factor, GROW) * step
-    return OK
+    return OUTCOME.OK
 
 
 def staged(
     s: Ints, x: Floats, w: Floats, t0: float, step: float, c: float, y0: Floats, y: Floats, stages: Floats, room: Floats
 ) -> bool:
     """Compute the stages; y has room for a state and its derivative."""
-    size, f = s[STATE_SIZE], at(y, s[STATE_SIZE])
+    size, f = s[MODEL.STATE_SIZE], at(y, s[MODEL.STATE_SIZE])
     for i in range(STAGES):
         stage, rates = at(stages, size * i), f if i > 0 else at(y0, size)
         if i > 0:
@@ -119,8 +119,8 @@ def staged(
                 y[k] = y0[k]
                 for j in range(i):
                     y[k] += PLACES[STAGES * i + j] * stages[size * j + k]
-            w[TIME] = t0 + TIMES[i] * step
-            if call(s[LAWS], s, x, w, y, f, ACCELERATION_STAGE) != OK or not is_finite(size, f):
+            w[WORK.TIME] = t0 + TIMES[i] * step
+            if call(s[MODEL.LAWS], s, x, w, y, f, STAGE.ACCELERATION) != OUTCOME.OK or not is_finite(size, f):
                 return False
         for k in range(size):
             stage[k] = c * rates[k]

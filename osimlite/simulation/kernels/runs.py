@@ -9,7 +9,7 @@ from math import inf
 
 from osimlite.simulation.integrators import shortest_step
 from osimlite.simulation.kernels.error_control import projected
-from osimlite.simulation.kernels.layout import ACCELERATION_STAGE, CONSTRAINED, CONTACTS, OK, STATE_SIZE, WORK_STATE
+from osimlite.simulation.kernels.layout import MODEL, OUTCOME, STAGE
 from osimlite.simulation.kernels.method import (
     ACCEPTED,
     EVALUATED,
@@ -79,7 +79,7 @@ def run_several(
     Args: as of `Motion`, one row for each run; a log, `w` and what tells how to run serve them all. `each` is the
     length of a row of numbers, 0 if one serves them all.
     """
-    size, pairs = s[STATE_SIZE], s[CONTACTS]
+    size, pairs = s[MODEL.STATE_SIZE], s[MODEL.CONTACTS]
     for k in range(first, last):
         m = Motion(
             s,
@@ -98,25 +98,25 @@ def run_several(
             levels,
         )
         endings[k] = run(m, at(states, k * size))
-    return OK
+    return OUTCOME.OK
 
 
 def run(m: Motion, y: Floats) -> int:
     """Go on from the state y, which is changed, until something ends the run."""
     s, counts, clock, sizes = m.s, m.counts, m.clock, m.sizes
-    size = s[STATE_SIZE]
-    room, h = at(m.w, s[WORK_STATE]), at(m.w, sizes[METHOD_AT])
+    size = s[MODEL.STATE_SIZE]
+    room, h = at(m.w, s[MODEL.WORK_STATE]), at(m.w, sizes[METHOD_AT])
     y0, f0, y1, f1 = room, at(room, size), at(room, 2 * size), at(room, 3 * size)
     before = at(room, STATES * size)
-    after = at(before, s[CONTACTS] + sizes[WATCHES])
-    is_kept = s[CONSTRAINED] == 0 or sizes[START_HOLDS] > 0
+    after = at(before, s[MODEL.CONTACTS] + sizes[WATCHES])
+    is_kept = s[MODEL.CONSTRAINED] == 0 or sizes[START_HOLDS] > 0
     if not is_kept and not projected(s, m.x, m.w, clock[0], y, f0, 0, h[ACCEPTED] / 10.0, inf):
         return FAILED
     copy(size, y, y0)
-    status = evaluated(m, clock[0], y0, f0, ACCELERATION_STAGE)
+    status = evaluated(m, clock[0], y0, f0, STAGE.ACCELERATION)
     if counts[TAKEN] == 0 and counts[EVALUATIONS] == 0:
         counts[EVALUATIONS], h[MEMORY] = 1, 0.0
-    if status != OK or not is_finite(size, f0):
+    if status != OUTCOME.OK or not is_finite(size, f0):
         return FAILED
     levels_at(m, y0, before)
     note_peaks(m, clock[0])
@@ -148,7 +148,7 @@ def run(m: Motion, y: Floats) -> int:
             end = note_events(m, t0, y0, f0, t1, y1, f1, before, after)
             stopped = end <= t1
             end = min(end, t1)
-            copy(s[CONTACTS] + sizes[WATCHES], after, before)
+            copy(s[MODEL.CONTACTS] + sizes[WATCHES], after, before)
         while counts[REPORTED] < sizes[TIMES] and m.times[counts[REPORTED]] <= end:
             t, report = m.times[counts[REPORTED]], at(m.reports, size * counts[REPORTED])
             if t == t1:
@@ -171,10 +171,10 @@ def run(m: Motion, y: Floats) -> int:
 
 def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
     """Whether the end of a step has a derivative, which a method may have found where no forces are looked at."""
-    if m.w[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0 and m.s[CONTACTS] + m.sizes[WATCHES] == 0:
-        return is_finite(m.s[STATE_SIZE], f1)
+    if m.w[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0 and m.s[MODEL.CONTACTS] + m.sizes[WATCHES] == 0:
+        return is_finite(m.s[MODEL.STATE_SIZE], f1)
     m.counts[EVALUATIONS] += 1
-    return evaluated(m, t1, y1, f1, ACCELERATION_STAGE) == OK and is_finite(m.s[STATE_SIZE], f1)
+    return evaluated(m, t1, y1, f1, STAGE.ACCELERATION) == OUTCOME.OK and is_finite(m.s[MODEL.STATE_SIZE], f1)
 
 
 def step(m: Motion, t0: float, y0: Floats, y1: Floats) -> float:

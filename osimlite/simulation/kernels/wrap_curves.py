@@ -19,7 +19,7 @@ from osimlite.forces.vectors import (
     unit,
     vector,
 )
-from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.layout import ITEM
 from osimlite.simulation.kernels.path_wraps import BACK, BEST, POSE, WRAP_INTS, in_ground
 from osimlite.simulation.kernels.paths import COUNT, NODE_INTS, NODE_WORK, NODES_AT, ORDER, PLACE, POINTS, WRAPS
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
@@ -39,7 +39,7 @@ def trace_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
 
     After the wraps among the integers of the path stand the laws that trace it on each surface, or 0.
     """
-    i, result = at(s, item), at(w, s[item + RECORD])
+    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
     points, wraps = i[POINTS], i[WRAPS]
     size = points + 2 * wraps
     order, work = at(result, ORDER), at(result, ORDER + size)
@@ -63,7 +63,7 @@ def pieces(angle: float) -> int:
 
 def trace_cylinder(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """A helix about z."""
-    e = at(w, s[item + RECORD])
+    e = at(w, s[item + ITEM.RECORD])
     one, two, turn = vector(e, FIRST), vector(e, SECOND), e[SHAPE]
     count = pieces(turn)
     for k in range(1, count):
@@ -73,7 +73,7 @@ def trace_cylinder(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: in
 
 def trace_torus(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """A helix on the cylinder in the place of the ring."""
-    p, e = at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    p, e = at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
     ring, outwards = p[SIZES + 1], (e[SHAPE + 1], e[SHAPE + 2], 0.0)
     one, two = in_cylinder(vector(e, FIRST), outwards, ring), in_cylinder(vector(e, SECOND), outwards, ring)
     count = pieces(e[SHAPE])
@@ -93,7 +93,7 @@ def on_helix(one: Vector, two: Vector, turn: float, part: float) -> Vector:
 
 def trace_sphere(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """A great circle."""
-    e = at(w, s[item + RECORD])
+    e = at(w, s[item + ITEM.RECORD])
     one, turn = vector(e, FIRST), e[SHAPE]
     across = cross(unit(cross(one, vector(e, SECOND))), one)
     count = pieces(turn)
@@ -105,7 +105,7 @@ def trace_sphere(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int)
 
 def trace_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """The section with the plane of the path; nothing where OpenSim's points are none."""
-    p, e = at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    p, e = at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
     a, b, c = vector(p, SIZES)
     factor = 3.0 / (a + b + c)
     one, two = times(factor, vector(e, FIRST)), times(factor, vector(e, SECOND))

@@ -14,7 +14,7 @@ from __future__ import annotations
 from math import atan2, cos, inf, pi, radians, sin, sqrt, tan
 
 from osimlite.forces.vectors import EPSILON, Vector, along, cross, dot, minus, plus, put, unit, vector
-from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.layout import ITEM
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.wrap_sides import action, nearest_pair, on_side, tangents
 from osimlite.simulation.kernels.wrapping import (
@@ -45,7 +45,7 @@ BEND, ROUNDS = tan(radians(0.1)), 100
 
 def wrap_cylinder(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """The law of a WrapCylinder, see :mod:`osimlite.simulation.kernels.wrapping`."""
-    p, e = at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    p, e = at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
     first, second = vector(e, FIRST_END), vector(e, SECOND_END)
     return around_cylinder(first, second, p[SIZES], p[SIZES + 1], int(p[AXIS]), p[SIDE], p[ALONE] == 1.0, e)
 

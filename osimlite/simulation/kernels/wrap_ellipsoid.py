@@ -29,7 +29,7 @@ from osimlite.forces.vectors import (
     vector,
 )
 from osimlite.simulation.kernels.closest_on_ellipsoid import closest_in_plane, closest_point, fan
-from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.layout import ITEM
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.wrap_sides import nowhere, on_side
 from osimlite.simulation.kernels.wrapping import (
@@ -65,7 +65,7 @@ step that is taken."""
 
 def wrap_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """The law of a WrapEllipsoid, see :mod:`osimlite.simulation.kernels.wrapping`."""
-    p, e = at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    p, e = at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
     a, b, c = vector(p, SIZES)
     factor, axis, side = 3.0 / (a + b + c), int(p[AXIS]), p[SIDE]
     radii = times(factor, (a, b, c))

@@ -20,7 +20,7 @@ from osimlite.forces.vectors import (
     unit,
     vector,
 )
-from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.layout import ITEM
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.wrap_sides import action, nearest_pair, nowhere, on_side, tangents
 from osimlite.simulation.kernels.wrapping import (
@@ -48,7 +48,7 @@ def wrap_sphere(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) 
     As in OpenSim a line through the centre goes straight on, a length on the far side of the sphere is negative, and
     where a side is active a line must wrap only if its first end is less than 1 m from the middle of it.
     """
-    p, e = at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    p, e = at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
     first, second, radius = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES]
     if norm(first) < radius or norm(second) < radius:
         return INSIDE

@@ -20,7 +20,7 @@ from osimlite.forces.vectors import (
     times,
     vector,
 )
-from osimlite.simulation.kernels.layout import NUMBERS, RECORD
+from osimlite.simulation.kernels.layout import ITEM
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
 from osimlite.simulation.kernels.wrap_cylinder import around_cylinder
 from osimlite.simulation.kernels.wrap_sides import nowhere, on_side
@@ -51,7 +51,7 @@ DOWN = (0.0, 0.0, -1.0)
 
 def wrap_torus(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
     """The law of a WrapTorus about z, see :mod:`osimlite.simulation.kernels.wrapping`; a piece never must wrap."""
-    p, e = at(x, s[item + NUMBERS]), at(w, s[item + RECORD])
+    p, e = at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
     first, second, ring = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES + 1]
     one, two = near_ring(first, second, ring), near_ring(second, first, ring)
     closer = distance_from_ring(one, ring) < distance_from_ring(two, ring)

@@ -26,7 +26,7 @@ def test_a_kind_is_found_by_its_class_and_is_in_the_manual(kind, repo):
 @pytest.mark.parametrize("kind", DECLARED, ids=lambda kind: kind.name)
 def test_the_kernel_follows_from_the_declaration(kind):
     source = inspect.getsource(kind.text.kernel)
-    assert source.startswith(f"def {kind.name}(") and source.endswith("return OK\n")
+    assert source.startswith(f"def {kind.name}(") and source.endswith("return OUTCOME.OK\n")
     assert kind.law is None or " law(" in source
     # What the geometry applies is given by the law.
     applied = set(re.findall(r"\w+", " ".join(kind.geometry.after)))

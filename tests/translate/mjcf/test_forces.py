@@ -29,7 +29,7 @@ from osimlite import (
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.linking import PYTHON
 from osimlite.simulation.given_controls import driven
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import STAGE
 from osimlite.simulation.system import System
 from osimlite.translate import to_mjcf
 from tests.translate.mjcf.compiled import Compiled
@@ -154,7 +154,7 @@ def test_a_bushing_accelerates_as_opensims_does():
     mechanism = osimlite.mechanism(model)
     system = System(mechanism, force_elements(model, mechanism), code=PYTHON)
     q = mechanism.values({})
-    system.realize(0.0, [*q[list(system.order)], *np.zeros(6)], layout.ACCELERATION_STAGE)
+    system.realize(0.0, [*q[list(system.order)], *np.zeros(6)], STAGE.ACCELERATION)
     wanted = np.empty(5)
     wanted[list(system.order)] = system.found()[5:10]
     compiled = Compiled(to_mjcf(model))

@@ -9,7 +9,7 @@ from osimlite.records import dataclass
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
-from osimlite.simulation.kernels.layout import FREEDOMS
+from osimlite.simulation.kernels.layout import MODEL
 from osimlite.simulation.kernels.pointers import Floats, Ints
 
 
@@ -17,7 +17,7 @@ def coordinate(s: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, float]:
     """Value and speed of a coordinate, which has its own value if it is locked."""
     if g[0] < 0:
         return gp[0], 0.0
-    return y[g[0]], y[s[FREEDOMS] + g[0]]
+    return y[g[0]], y[s[MODEL.DOFS] + g[0]]
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class OnCoordinate(Geometry):
     speed = "u"
     along = "force", 1
     before = ("q, u = coordinate(s, y, g, gp)",)
-    after = ("if g[0] >= 0:", "    f[s[FREEDOMS] + g[0]] += force")
+    after = ("if g[0] >= 0:", "    f[s[MODEL.DOFS] + g[0]] += force")
     calls = (coordinate,)
 
     def read(self, builder: ElementBuilder, force: Any) -> int:

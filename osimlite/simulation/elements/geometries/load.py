@@ -77,7 +77,7 @@ class Load(NamedTuple):
 class GivenLoad(Geometry):
     """A load that is given; there is no law."""
 
-    after = ("apply_load(s, w, g, gp, room, w[TIME])",)
+    after = ("apply_load(s, w, g, gp, room, w[WORK.TIME])",)
     calls = (apply_load,)
 
     def pack(self, place: Load, places: Places) -> tuple[Sequence[int], Sequence[float]]:

@@ -29,7 +29,11 @@ class AlongPath(Geometry):
     inputs = ("length", "rate")
     speed = "rate"
     along = "tension", -1
-    before = ("length, rate = path_length(s, x, w, y, f, item - g[0])", "if length != length:", "    return UNSOLVED")
+    before = (
+        "length, rate = path_length(s, x, w, y, f, item - g[0])",
+        "if length != length:",
+        "    return OUTCOME.UNSOLVED",
+    )
     after = ("pull_path(s, x, w, y, f, item - g[0], tension)",)
     calls = (path_length, pull_path)
 

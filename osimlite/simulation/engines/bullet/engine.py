@@ -30,7 +30,7 @@ from osimlite.simulation.engines.bullet.file import excess, require_masses
 from osimlite.simulation.engines.bullet.stepper import BulletStepper
 from osimlite.simulation.engines.bullet.world import World, bullet
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.kernels import layout
+from osimlite.simulation.kernels.layout import CHAIN, MODEL
 from osimlite.simulation.kernels.pack_chain import Chain
 from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.stepper import Observer, Stepper
@@ -114,7 +114,7 @@ class BulletEngine(KernelEngine):
         # Bullet takes inertias that no body has, but not for mass matrices.
         self._steps_itself = is_plain and (is_exact or not added)
         count = len(body.joints)
-        self._moves = self.structure[self.structure[layout.CHAIN] + layout.WORK_JOINTS] if count else 0
+        self._moves = self.structure[self.structure[MODEL.CHAIN] + CHAIN.WORK_JOINTS] if count else 0
         self._forces = self._moves + 3 * count
         self._pack_forces: Any = Struct(f"{count}d").pack_into
         self._pack_matrix: Any = Struct(f"{count * count}d").pack_into

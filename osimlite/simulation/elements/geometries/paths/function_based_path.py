@@ -15,7 +15,7 @@ from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.kernels.function_paths import ARMS, DERIVATIVES
 from osimlite.simulation.kernels.functions import table_of_one
-from osimlite.simulation.kernels.layout import OWN
+from osimlite.simulation.kernels.layout import ITEM
 from osimlite.simulation.kernels.programs import program
 
 
@@ -47,7 +47,7 @@ class OfCoordinates:
         of_values = [self._item(item, freedoms, values) for item in (self.length, *self.arms)]
         of_speeds = [self._item(self.speed, freedoms + speeds, values + [0.0] * len(values))] if self.speed else []
         parts = [Item("pull_coordinates", is_part=True), *of_values, *of_speeds]
-        backs = [sum(OWN + len(item.ints) for item in parts[index:]) for index in range(len(parts))]
+        backs = [sum(ITEM.OWN + len(item.ints) for item in parts[index:]) for index in range(len(parts))]
         arms = backs[2 : 2 + len(self.arms)] or [0] * len(values)
         ints = backs[0], len(values), backs[1], backs[-1] if of_speeds else 0, *freedoms, *arms
         return [*parts, Item("function_path", ints, room=ARMS + len(values), is_part=True)]

@@ -24,7 +24,7 @@ from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.kernels.cable_surfaces import CYLINDER, ELLIPSOID, SPHERE, TORUS
 from osimlite.simulation.kernels.functions import table_of_one
 from osimlite.simulation.kernels.geodesic_paths import slots_and_room
-from osimlite.simulation.kernels.layout import OWN
+from osimlite.simulation.kernels.layout import ITEM
 from osimlite.simulation.kernels.path_wraps import SURFACE_WORK
 from osimlite.simulation.kernels.paths import CLAMPED, CONDITIONAL, FIXED, MOVING, NODE_WORK, ORDER, TANGENT
 from osimlite.simulation.kernels.wrap_curves import MOST
@@ -147,13 +147,13 @@ class ThroughPoints:
         for surface in () if self.geodesic else self.surfaces:
             if surface.law:
                 parts.append(Item(surface.law, (), surface.numbers, room=SURFACE_WORK, is_part=True))
-                wraps.append(OWN * (behind + 2 - len(parts)))
+                wraps.append(ITEM.OWN * (behind + 2 - len(parts)))
             else:
                 wraps.append(0)
             wraps += surface.first, surface.last
         nodes = [(point, places.freedom(point.coordinate)) for point in self.points]
         nodes += [(surface.tangent, surface.number) for surface in self.surfaces for _ in range(2)]
-        ints, numbers = [OWN * len(parts), len(self.points), len(self.surfaces)], list[float]()
+        ints, numbers = [ITEM.OWN * len(parts), len(self.points), len(self.surfaces)], list[float]()
         for number, (node, of) in enumerate(nodes):
             # A geodesic path pulls along all lines, since a point may move in its body, but for chords of surfaces.
             piece = node.body if not self.geodesic else (-1 - of if node.kind == TANGENT else number)

@@ -35,7 +35,7 @@ from osimlite.simulation.kernels.cable_paths import (
     solver_room,
 )
 from osimlite.simulation.kernels.cable_surfaces import CYLINDER, ELLIPSOID, END, POINT, SPHERE, START, STEP, TORUS
-from osimlite.simulation.kernels.layout import OWN
+from osimlite.simulation.kernels.layout import ITEM
 from osimlite.simulation.kernels.paths import LENGTH
 from osimlite.simulation.kernels.wrap_curves import MOST
 
@@ -130,7 +130,7 @@ class Cable:
             ints += int(element.is_obstacle), link, len(numbers), work
             numbers += own
             work += element.work
-        head = OWN, len(self.elements), work
+        head = ITEM.OWN, len(self.elements), work
         path = Item("cable_path", (*head, *ints), tuple(numbers), room=work + solver_room(most), is_part=True)
         return [Item("pull_cable", is_part=True), path]
 
@@ -139,7 +139,7 @@ class Cable:
         state = mechanism.at(q)
         placements = [Placement(GROUND, state.transform(body)) for body in range(len(mechanism.bodies))]
         _, path = self.items(Places(mechanism, {}, placements))
-        ints, work = np.array([0] * OWN + list(path.ints)), np.zeros(path.room)
+        ints, work = np.array([0] * ITEM.OWN + list(path.ints)), np.zeros(path.room)
         cable_path(ints, np.array(path.numbers), work, np.zeros(1), np.zeros(1), 0)
         if np.isnan(work[LENGTH]):
             return None
