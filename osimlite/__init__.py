@@ -2,9 +2,9 @@
 
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
 ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``inverse_kinematics``,
-``FrameSolver``, ``scale``, ``fit``, ``kinematics``, ``inverse_dynamics``, ``run``, ``report``, the errors, and every
-component class under OpenSim's own name (``osimlite.PinJoint``). Names are imported when first used, so that importing
-osimlite costs nothing.
+``FrameSolver``, ``scale``, ``fit``, ``kinematics``, ``inverse_dynamics``, ``static_optimization``, ``run``,
+``report``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``). Names are imported
+when first used, so that importing osimlite costs nothing.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from osimlite.simulation.paths import paths as paths
     from osimlite.simulation.recorded import inverse_dynamics as inverse_dynamics
     from osimlite.simulation.recorded import kinematics as kinematics
+    from osimlite.simulation.shared_forces import static_optimization as static_optimization
     from osimlite.tools.running import run as run
     from osimlite.translate import to_mjcf as to_mjcf
     from osimlite.translate import to_urdf as to_urdf
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
         "run",
         "scale",
         "simulate",
+        "static_optimization",
         "to_mjcf",
         "to_text",
         "to_urdf",
@@ -88,6 +90,7 @@ _FUNCTIONS = {
     "inverse_dynamics": "osimlite.simulation.recorded",
     "kinematics": "osimlite.simulation.recorded",
     "simulate": "osimlite.simulation",
+    "static_optimization": "osimlite.simulation.shared_forces",
     "OsimliteError": "osimlite.errors",
 }
 

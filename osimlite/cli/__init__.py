@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 COMMANDS = (
     "build", "validate", "rule", "format", "upgrade", "diff", "info", "translate", "view", "simulate", "sweep",
-    "optimize", "gait", "find-gait", "muscles", "scale", "fit", "ik", "kinematics", "inverse-dynamics", "run", "lsp",
-    "doctor", "demo",
+    "optimize", "gait", "find-gait", "muscles", "scale", "fit", "ik", "kinematics", "inverse-dynamics",
+    "static-optimization", "run", "lsp", "doctor", "demo",
 )  # fmt: skip
 """Every command in the order of the help; ``osimlite.cli.<name>.<name>``, with _ for -, is its function."""
 

@@ -31,6 +31,7 @@ PAGES = {
     "osimlite.cli.scale": "docs/fitting.md#scaling",
     "osimlite.cli.fit": "docs/fitting.md#a-model-that-fits-the-person",
     "osimlite.cli.simulate": "docs/from-opensim.md#simulating",
+    "osimlite.cli.static_optimization": "docs/running-tools.md#muscle-forces",
     "osimlite.cli.sweep": "docs/sweeps.md#a-sweep",
     "osimlite.cli.translate": "docs/urdf.md",
     "osimlite.cli.upgrade": "docs/errors.md#versions",

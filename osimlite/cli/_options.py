@@ -49,6 +49,16 @@ Lowpass = Annotated[
     float | None,
     Option(metavar="HZ", help="Filter the coordinates first, as OpenSim's tools do; 6 is usual.", show_default=False),
 ]
+AppliedTo = Annotated[
+    list[str] | None,
+    Option(
+        "--applied-to",
+        metavar="BODY=FORCE,POINT,MOMENT",
+        help="What columns of a table --external-loads push a body: the beginnings of their labels, f1_,p1_,m1_ "
+        "for the first plate of a .c3d, with + between several loads. Point and moment may be left out.",
+        show_default=False,
+    ),
+]
 Foot = Annotated[
     list[str] | None,
     Option(
@@ -128,6 +138,12 @@ def named_words(words: Iterable[str] | None, option: str, form: str = "NAME=VALU
             raise SettingError(f"{option} names '{name}' twice; leave one out")
         result[name] = value
     return result
+
+
+def applied_loads(words: Iterable[str] | None) -> dict[str, list[list[str]]]:
+    """What ``--applied-to`` says, as :func:`osimlite.inverse_dynamics` takes it; errors as of `named_words`."""
+    named = named_words(words, "--applied-to", "BODY=FORCE,POINT,MOMENT")
+    return {body: [load.strip().split(",") for load in text.split("+")] for body, text in named.items()}
 
 
 def named_numbers(words: Iterable[str] | None, option: str) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from osimlite.cli._console import say
@@ -27,10 +27,15 @@ def written(recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Pa
         labels = [label.removesuffix("_X") for label in markers.columns[::3]]
         write_trc(folder / "markers.trc", markers.times.tolist(), labels, markers.rows.tolist())
         names.append("markers.trc")
+    say_motion(recorded, [folder / name for name in names])
+
+
+def say_motion(recorded: RecordedMotion, files: Iterable[Path]) -> None:
+    """Say what was made from a motion, and what of it counted."""
     if recorded.missing:
         say(f"not in the motion, kept at the default value: {listed(recorded.missing)}")
     if recorded.ignored:
         say(f"columns that name no coordinate, ignored: {listed(recorded.ignored)}")
     times = recorded.times
-    paths = listed([str(folder / name) for name in names])
+    paths = listed([str(file) for file in files])
     say(f"{len(times)} times from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")

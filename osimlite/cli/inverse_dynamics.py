@@ -12,16 +12,7 @@ from osimlite.cli._command import Option, command_with
 def inverse_dynamics(
     file: options.File,
     motion: options.Motion,
-    applied: Annotated[
-        list[str] | None,
-        Option(
-            "--applied-to",
-            metavar="BODY=FORCE,POINT,MOMENT",
-            help="What columns of a table --external-loads push a body: the beginnings of their labels, f1_,p1_,m1_ "
-            "for the first plate of a .c3d, with + between several loads. Point and moment may be left out.",
-            show_default=False,
-        ),
-    ] = None,
+    applied: options.AppliedTo = None,
     exclude: Annotated[
         list[str] | None,
         Option(
@@ -48,14 +39,10 @@ def inverse_dynamics(
     from osimlite.document.reader import read
     from osimlite.simulation.recorded import inverse_dynamics as forces_of
 
-    loads = {
-        body: [load.strip().split(",") for load in text.split("+")]
-        for body, text in options.named_words(applied, "--applied-to", "BODY=FORCE,POINT,MOMENT").items()
-    }
     table = forces_of(
         read(file),
         motion,
-        applied_to=loads,
+        applied_to=options.applied_loads(applied),
         exclude=exclude or ["Muscles"],
         lowpass=lowpass,
         start=first,

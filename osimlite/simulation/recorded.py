@@ -13,6 +13,7 @@ from osimlite.errors import SettingError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.records import dataclass, field
+from osimlite.schema.forces import Force, ForceSet
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.files.recorded import Recorded, RecordedMotion, exclude_forces, excluded_forces
@@ -56,7 +57,7 @@ def kinematics(
         SettingError: no time lies between the first and the last, or the filter does not fit the times.
         SimulationError: a pose is too far from fulfilling the constraints.
     """
-    return _followed(build_mechanism(model), motion, times, assemble, lowpass, start, end)
+    return followed(build_mechanism(model), motion, times, assemble, lowpass, start, end)
 
 
 def inverse_dynamics(
@@ -100,24 +101,57 @@ def inverse_dynamics(
         SettingError: no time lies between the first and the last, there are too few, or a name is none.
         UnsupportedError: a force of the model cannot be computed.
     """
-    if applied_to:
-        from osimlite.simulation.elements.external_loads import pushing
-
-        if not isinstance(external_loads, str | Path):
-            raise SettingError("applied_to says what the columns of a table push; name the table as external_loads")
-        external_loads = pushing(external_loads, applied_to)
+    external_loads = loads_of(external_loads, applied_to)
     excluded, pushed = [*exclude], model
     if excluded_forces(model, excluded):
         pushed = model.copy_deep()
         exclude_forces(pushed, excluded)
     mechanism = build_mechanism(pushed, opensim_derivatives=opensim_derivatives)
-    recorded = _followed(mechanism, motion, times, False, lowpass, start, end)
+    recorded = followed(mechanism, motion, times, False, lowpass, start, end)
     forces = force_elements(pushed, mechanism, wrapping=wrapping, external_loads=external_loads, folder=folder)
     table = recorded.inverse_dynamics(forces)
     return GeneralizedForces(table.name, table.times, table.columns, table.rows, motion=recorded)
 
 
-def _followed(
+def loads_of(
+    external_loads: str | Path | ExternalLoads | None, applied_to: Mapping[str, Sequence[Sequence[str]]] | None
+) -> str | Path | ExternalLoads | None:
+    """The loads, also where they are a table of which `applied_to` says what it pushes; see :func:`inverse_dynamics`.
+
+    Raises:
+        SettingError: there is no table.
+    """
+    if not applied_to:
+        return external_loads
+    from osimlite.simulation.elements.external_loads import pushing
+
+    if not isinstance(external_loads, str | Path):
+        raise SettingError("applied_to says what the columns of a table push; name the table as external_loads")
+    return pushing(external_loads, applied_to)
+
+
+def add_forces(model: Model, forces: Iterable[str | Path | Force], *, replace: bool = False) -> None:
+    """Give a model more forces, from files of ForceSets, or others in the place of its own.
+
+    Raises:
+        DocumentError: a file is missing, or no ForceSet.
+    """
+    from osimlite.document.reader import read_document
+    from osimlite.document.source import Source
+
+    if replace:
+        model.force_set.objects.clear()
+    for each in forces:
+        if isinstance(each, Force):
+            model.force_set.objects.append(each.copy_deep())
+            continue
+        more = read_document(Source.of_file(each), of=ForceSet).top
+        assert isinstance(more, ForceSet)
+        for force in list(more.objects):
+            model.force_set.objects.append(force)
+
+
+def followed(
     mechanism: Mechanism,
     motion: Recorded,
     times: ArrayLike | None,
@@ -126,6 +160,7 @@ def _followed(
     start: float,
     end: float,
 ) -> RecordedMotion:
+    """The part of a motion that counts, filtered and assembled if it is to be; see :func:`kinematics`."""
     recorded = RecordedMotion.of(mechanism, motion, times)
     if lowpass is not None:
         recorded = recorded.lowpassed(lowpass)

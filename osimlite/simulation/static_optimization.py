@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,10 +39,15 @@ from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.kernels.effort import effort_room
 from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.simulation.system import System
-from osimlite.text import listed
+from osimlite.text import counted, listed, or_known
+
+if TYPE_CHECKING:
+    from osimlite.schema.prescribed import ExternalLoads
 
 ALIKE = 1e-9
 """Rates of coordinates that differ by no more are the same."""
+MUSCLES = ("active", "isometric")
+"""What muscles can pull with: their fully active fibers along a rigid tendon, or their max_isometric_force."""
 TITLE, FORCES_TITLE = "Static Optimization", "ModelForces"
 
 
@@ -97,6 +103,17 @@ class Shared:
         worst = [place for place in np.argsort(-sizes) if sizes[place] > 0.1 * sizes.max()]
         return listed([f"{self.lacking[row, k]:.4g} at {self.coordinates[k]}" for k in worst], most=3)
 
+    def unsolved(self) -> str:
+        """The times without a solution in words, with the coordinates that lack strength; empty if there are none."""
+        failed = np.flatnonzero(~self.solved)
+        if not len(failed):
+            return ""
+        worst = failed[np.argmax(np.abs(self.lacking[failed]).max(axis=1))]
+        return (
+            f"no solution at {len(failed)} of {counted(len(self.times), 'time')}, from {self.times[failed[0]]:g} s "
+            f"on, where nothing is written; at {self.times[worst]:g} s the actuators lack {self.lacks(worst)}"
+        )
+
 
 class StaticOptimization:
     """Shares the generalized forces of motions among the actuators of a model.
@@ -105,14 +122,14 @@ class StaticOptimization:
         model: whose actuators.
         mechanism: of it.
         exponent: p, more than 1.
-        physiology: whether the force of a muscle depends on its length and speed, or is its max_isometric_force.
+        muscles: what one pulls with by an activation of 1, one of `MUSCLES`.
         wrapping: how paths bend around surfaces.
-        external_loads: a file of ExternalLoads.
+        external_loads: measured loads or their file.
         folder: where the model's file is.
         early_return: whether Simbody's defect in contact of several surfaces is reproduced.
 
     Raises:
-        SettingError: the exponent is not more than 1.
+        SettingError: the exponent is not more than 1, or muscles have no such force.
         ModelError: there are no actuators, or fewer than coordinates that they are to accelerate.
         UnsupportedError: one has no force that is proportional to its control, or cannot be computed.
     """
@@ -123,18 +140,20 @@ class StaticOptimization:
         mechanism: Mechanism,
         *,
         exponent: float = 2.0,
-        physiology: bool = True,
+        muscles: str = "active",
         wrapping: str = OPENSIM,
-        external_loads: str | Path | None = None,
+        external_loads: str | Path | ExternalLoads | None = None,
         folder: str | Path | None = None,
         early_return: bool = False,
     ) -> None:
         if not 1.0 < exponent < np.inf:
             raise SettingError(f"an exponent of {exponent:g} has not one answer; give a number above 1, such as 2")
+        if muscles not in MUSCLES:
+            raise SettingError(f"muscles pull with no '{muscles}' force{or_known(muscles, MUSCLES)}")
         self.mechanism, self._exponent = mechanism, exponent
         model = model.copy_deep()
         model.controller_set.objects.clear()
-        self._actuators = _idealised(model, physiology)
+        self._actuators = _idealised(model, muscles != "isometric")
         tree = model.tree()
         self._paths = [tree.path_of(item) or "" for item in self._actuators]
         self._forces = force_elements(
@@ -164,6 +183,8 @@ class StaticOptimization:
         for item, low, high in zip(self._actuators, *self._bounds, strict=True):
             if not low <= high:
                 raise ModelError(f"'{item.name}' has a min_control of {low:g} above its max_control of {high:g}")
+            if not (low < np.inf and high > -np.inf):
+                raise ModelError(f"'{item.name}' has controls from {low:g} to {high:g} only; give it a finite one")
 
     @cached_property
     def _system(self) -> System:
@@ -217,16 +238,23 @@ class StaticOptimization:
             return udot, ways
         system = System(self.mechanism, Forces(()))
         order, head = list(system.order), int(system.structure[MODEL.CONSTRAINED])
-        count = int(system.structure[head + CONSTRAINED.EQUATIONS])
-        rows, drifts = (
-            int(system.structure[head + place]) for place in (CONSTRAINED.WORK_ROWS, CONSTRAINED.WORK_DRIFTS)
+        # Locked coordinates are no part of the state, nor of the equations of the kernels.
+        still = [place for place in range(size) if place not in order]
+        count = int(system.structure[head + CONSTRAINED.EQUATIONS]) if head else 0
+        equations, targets = (
+            np.zeros((len(times), count + len(still), size)),
+            np.zeros((len(times), count + len(still))),
         )
-        moments = np.column_stack([times, system.state.rows(values, speeds)])
-        places = [*range(rows, rows + count * len(order)), *range(drifts, drifts + count)]
-        looked = system.looked(moments, places, STAGE.ACCELERATION)
-        equations = np.zeros((len(times), count, size))
-        equations[:, :, order] = looked[:, : -count or None].reshape(len(times), count, -1)
-        targets = looked[:, looked.shape[1] - count :]
+        equations[:, range(count, count + len(still)), still] = 1.0
+        if count:
+            rows, drifts = (
+                int(system.structure[head + place]) for place in (CONSTRAINED.WORK_ROWS, CONSTRAINED.WORK_DRIFTS)
+            )
+            moments = np.column_stack([times, system.state.rows(values, speeds)])
+            places = [*range(rows, rows + count * len(order)), *range(drifts, drifts + count)]
+            looked = system.looked(moments, places, STAGE.ACCELERATION)
+            equations[:, :count, order] = looked[:, :-count].reshape(len(times), count, -1)
+            targets[:, :count] = looked[:, -count:]
         held = [place for place in range(size) if place not in free]
         inverse = np.linalg.pinv(equations[:, :, held])
         ways[:, held] = -inverse @ equations[:, :, free]

@@ -16,11 +16,11 @@ from osimlite.records import replace
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Object
 from osimlite.schema.controller_types import CorrectionController, PrescribedController
-from osimlite.schema.forces import ForceSet
 from osimlite.schema.model import Model
 from osimlite.schema.specs import file_specs
 from osimlite.schema.tools.dynamics import AbstractTool
 from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.simulation.recorded import add_forces
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.start import columns_of_states, starting
 from osimlite.text import listed
@@ -85,14 +85,9 @@ def told_model(job: Job) -> Model:
         NotRunnable: one of the controllers adds actuators that follow the states of the setup.
     """
     setup: AbstractTool = job.setup
+    paths = [path for name in setup.force_set_files if (path := job.place(name)) is not None]
     model = job.model()
-    if setup.replace_force_set:
-        model.force_set.objects.clear()
-    for name in setup.force_set_files:
-        path = job.place(name)
-        if path is not None:
-            for force in list(job.read(path, ForceSet).objects):
-                model.force_set.objects.append(force)
+    add_forces(model, paths, replace=setup.replace_force_set)
     for controller in setup.controller_set.objects:
         own = _from_here(job, controller.copy_deep())
         actuators = list(model.components(Actuator))

@@ -24,6 +24,7 @@ MEANINGS = {
     "--pictures": "of a basin, or of a walk",
     "--force": "over results of a sweep, or of a search",
     "--budget": "runs, or models",
+    "--forces": "shown in a picture or plot, or pushing besides",
     "--check": "of how text is laid out, or of a file of MuJoCo's",
     "--perturb": "once or often",
     "--samples": "of a sweep, or walkers",

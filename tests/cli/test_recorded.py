@@ -154,3 +154,32 @@ def test_loads_without_a_document(fixtures: Path, tmp_path: Path) -> None:
         assert done.code == 2 and said in done.err, done.err
     done = run("kinematics", walker, "still.mot", "--from", "0.05", "--until", "0.1", "-o", "out", folder=tmp_path)
     assert done.code == 0 and "6 times from 0.05 s to 0.1 s" in done.out
+
+
+def test_forces_are_shared(fixtures: Path, tmp_path: Path) -> None:
+    import osimlite
+
+    model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
+    names = [item.name for item in model.components(osimlite.Coordinate)]
+    reserves = osimlite.ForceSet(name="reserves")
+    for name in names:
+        reserves.objects.append(osimlite.CoordinateActuator(name=f"{name}_reserve", coordinate=name))
+    osimlite.write(reserves, tmp_path / "reserves.xml")
+    walker, times = str(fixtures / "walker" / "DynamicWalkerModel.osim"), [0.02 * k for k in range(10)]
+    write_sto(tmp_path / "still.mot", "still", times, ("Pelvis_tx",), [[0.1]] * 10)
+    done = run("static-optimization", walker, "still.mot", "--forces", "reserves.xml", "-o", "out", folder=tmp_path)
+    assert (done.code, done.err) == (0, "")
+    written = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert written == [f"StaticOptimization_{end}" for end in ("activation.sto", "controls.xml", "force.sto")]
+    activations = read_sto(tmp_path / "out" / written[0])
+    run("inverse-dynamics", walker, "still.mot", "-o", "out", folder=tmp_path)
+    moments = read_sto(tmp_path / "out" / "inverse_dynamics.sto")
+    assert activations["Pelvis_ty_reserve"] == pytest.approx(moments["Pelvis_ty_force"], rel=1e-9)
+    for item in reserves.objects:
+        if item.name == "Pelvis_ty_reserve":
+            item.min_control, item.max_control = 1000.0, 2000.0
+    osimlite.write(reserves, tmp_path / "reserves.xml")
+    done = run("static-optimization", walker, "still.mot", "--forces", "reserves.xml", "-o", "out", folder=tmp_path)
+    assert done.code == 1 and "no solution at 10 of 10 times" in done.err and "at Pelvis_ty" in done.err
+    done = run("static-optimization", walker, "still.mot", folder=tmp_path)
+    assert done.code == 1 and "no actuators" in done.err

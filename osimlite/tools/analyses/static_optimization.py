@@ -7,7 +7,6 @@ import numpy as np
 from osimlite.schema.tools.analyses import StaticOptimization as Setup
 from osimlite.simulation.files.control_nodes import control_set
 from osimlite.simulation.static_optimization import Shared, StaticOptimization
-from osimlite.text import counted
 from osimlite.tools.analyses.force_reporter import DESCRIPTION
 from osimlite.tools.motion import Motion, Tables
 from osimlite.tools.not_runnable import NotRunnable
@@ -28,7 +27,7 @@ def compute(analysis: Setup, motion: Motion, tables: Tables) -> None:
         motion.model,
         motion.mechanism,
         exponent=analysis.activation_exponent,
-        physiology=analysis.use_muscle_physiology,
+        muscles="active" if analysis.use_muscle_physiology else "isometric",
         external_loads=job.path("external_loads_file"),
         folder=job.needed("model_file").parent,
         early_return=True,
@@ -45,13 +44,7 @@ def compute(analysis: Setup, motion: Motion, tables: Tables) -> None:
 def tell(shared: Shared, name: str, tables: Tables) -> None:
     """Say how it went: times without a solution, and what is missing there."""
     outcome = tables.outcome
-    failed = np.flatnonzero(~shared.solved)
-    outcome.summary[f"{name}_unsolved"] = len(failed)
-    if len(failed):
+    outcome.summary[f"{name}_unsolved"] = np.count_nonzero(~shared.solved)
+    if said := shared.unsolved():
         outcome.done = False
-        worst = failed[np.argmax(np.abs(shared.lacking[failed]).max(axis=1))]
-        outcome.tell(
-            name,
-            f"no solution at {len(failed)} of {counted(len(shared.times), 'time')}, from {shared.times[failed[0]]:g} s "
-            f"on, where nothing is written; at {shared.times[worst]:g} s the actuators lack {shared.lacks(worst)}",
-        )
+        outcome.tell(name, said)
