@@ -3,8 +3,8 @@
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
 ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``inverse_kinematics``,
 ``FrameSolver``, ``scale``, ``fit``, ``kinematics``, ``inverse_dynamics``, ``static_optimization``, ``run``,
-``report``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``). Names are imported
-when first used, so that importing osimlite costs nothing.
+``check_trial``, ``report``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``).
+Names are imported when first used, so that importing osimlite costs nothing.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from osimlite.simulation.recorded import kinematics as kinematics
     from osimlite.simulation.shared_forces import static_optimization as static_optimization
     from osimlite.tools.running import run as run
+    from osimlite.tools.trials.check import check_trial as check_trial
     from osimlite.translate import to_mjcf as to_mjcf
     from osimlite.translate import to_urdf as to_urdf
     from osimlite.view.report import report as report
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
         "FrameSolver",
         "Model",
         "OsimliteError",
+        "check_trial",
         "classes_in",
         "fit",
         "inverse_dynamics",
@@ -87,6 +89,7 @@ _FUNCTIONS = {
     "paths": "osimlite.simulation.paths",
     "report": "osimlite.view.report",
     "run": "osimlite.tools.running",
+    "check_trial": "osimlite.tools.trials.check",
     "inverse_dynamics": "osimlite.simulation.recorded",
     "kinematics": "osimlite.simulation.recorded",
     "simulate": "osimlite.simulation",

@@ -93,7 +93,7 @@ def run(
     if statistics:
         show(_statistics(report, everything))
     else:
-        width = min(max(_width(), 40), 120)
+        width = min(max(terminal_width(), 40), 120)
         text = render(report, format, colour=wants_colour(), width=width, everything=everything)
         (show if format in FOR_PEOPLE else hand_over)(text)
     worst = Severity(fail_on) if fail_on is not None else _fail_on_of(files)
@@ -197,7 +197,8 @@ def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int, bool]:
     return count, left, unread is not None
 
 
-def _width() -> int:
+def terminal_width() -> int:
+    """Columns of the terminal; 80 if there is none."""
     import shutil
 
     return shutil.get_terminal_size((80, 24)).columns if sys.stdout.isatty() else 80

@@ -43,6 +43,7 @@ FAMILIES = {
     "6": "paths",
     "7": "files",
     "8": "data",
+    "9": "trials",
 }
 """The families of rules by the first digit of their codes."""
 
@@ -115,7 +116,8 @@ class Rule:
 
     `severity` is that of its findings unless it says otherwise of one; `before` has another for documents older than a
     version, where OpenSim does something else with them. `mends` says of what kind its mends are, `about` what it looks
-    at: ``model``, ``table``, ``document`` (a setup, or a part of one), ``measures`` (of the model's paths and muscles).
+    at: ``model``, ``table``, ``document`` (a setup, or a part of one), ``measures`` (of the model's paths and muscles),
+    ``trial`` (what was measured of a finished one).
     A rule that tells faults apart is a `group`: there is a rule for each `fault`, all with the same `check`.
     """
 
@@ -216,7 +218,7 @@ def _add(table: dict[str, Rule], rule: Rule) -> None:
     table[rule.code] = rule
 
 
-APART = {"document": ("setup_", "moco"), "table": ("table", "marker_table")}
+APART = {"document": ("setup_", "moco"), "table": ("table", "marker_table"), "trial": ("trial_",)}
 """How the names of modules begin whose rules are about these alone: nobody else loads them."""
 
 

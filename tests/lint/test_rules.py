@@ -6,6 +6,7 @@ import importlib.util
 import re
 from pathlib import Path
 from shutil import copy
+from typing import Any
 
 import pytest
 
@@ -20,10 +21,17 @@ HERE = Path(__file__).resolve().parent
 FIXTURES = HERE.parents[1] / "fixtures" / "lint"
 HEADINGS = ["What it does", "Why is this bad", "Example", "Use instead"]
 
-_spec = importlib.util.spec_from_file_location("skeleton", HERE / "skeleton.py")
-assert _spec is not None and _spec.loader is not None
-skeleton = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(skeleton)
+
+def beside(name: str) -> Any:
+    """A module of this folder."""
+    spec = importlib.util.spec_from_file_location(name, HERE / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+skeleton, trials = beside("skeleton"), beside("trials")
 
 MEASURED = "OSIM63"
 """Rules that speak of every muscle and path there is, wherever another rule has an example."""
@@ -33,6 +41,8 @@ RULES = [pytest.param(rule, id=rule.code) for rule in all_rules()]
 
 def checked(path: Path, rule: Rule):
     """What is found in an example or fixture of a rule."""
+    if path.suffix == ".trial":
+        return trials.checked_trial(path.read_text(), rule)
     return validate(path, ignore="" if rule.code.startswith(MEASURED) else MEASURED)
 
 
@@ -43,7 +53,7 @@ def example(rule: Rule, heading: str) -> bytes:
     assert block is not None, f"{rule.code} shows nothing under '{heading}'"
     if block[1] == "setup":
         return f'<OpenSimDocument Version="{CURRENT_VERSION}">\n{block[2]}</OpenSimDocument>\n'.encode()
-    if block[1] in ("document", "sto", "trc"):
+    if block[1] in ("document", "sto", "trc", "trial"):
         return block[2].replace("→", "\t").encode()
     return skeleton.document(block[2]).encode()
 
@@ -69,7 +79,7 @@ def test_a_page_has_its_headings_and_prose(rule):
 
 def example_file(rule: Rule, heading: str, folder: Path) -> Path:
     """The same as a file."""
-    block = re.search(r"```(sto|trc|setup)\n", rule.page)
+    block = re.search(r"```(sto|trc|setup|trial)\n", rule.page)
     path = folder / f"example.{'osim' if block is None else block[1].replace('setup', 'xml')}"
     if path.suffix == ".xml":
         # What setups name, and the tool that names a setup.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from pathlib import Path
 
@@ -17,6 +18,11 @@ from osimlite.lint.engine import all_rules
 from osimlite.lint.settings import Settings, settings_for
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures" / "lint"
+
+_spec = importlib.util.spec_from_file_location("trials", Path(__file__).with_name("trials.py"))
+assert _spec is not None and _spec.loader is not None
+trials = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(trials)
 
 TEXT = """\
 <OpenSimDocument Version="40600">
@@ -58,12 +64,18 @@ def test_thresholds_of_a_project_move_what_is_found(tmp_path):
 @pytest.mark.parametrize("rule", [rule for rule in all_rules() if rule.thresholds], ids=lambda rule: rule.code)
 def test_each_threshold_moves_the_findings_of_its_rule(rule):
     """With every threshold as wide as can be, or as narrow, the failing fixtures of a rule give other findings."""
-    fixtures = sorted((FIXTURES / rule.code).glob("fail-*.osim")) + sorted((FIXTURES / rule.code).glob("pass-*.osim"))
+    fixtures = [path for kind in ("osim", "trial") for path in sorted((FIXTURES / rule.code).glob(f"*-*.{kind}"))]
     for threshold in rule.thresholds:
         seen = set()
         for moved in ({}, {threshold.name: 0}, {threshold.name: threshold.default / 100}, {threshold.name: 1e300}):
             config = Config((rule.code,), thresholds=moved)
-            seen.add(tuple(finding.line for path in fixtures for finding in validate(path, config=config)))
+            reports = [
+                trials.checked_trial(path.read_text(), rule, config)
+                if path.suffix == ".trial"
+                else validate(path, config=config)
+                for path in fixtures
+            ]
+            seen.add(tuple((finding.line, finding.severity) for report in reports for finding in report))
         assert len(seen) > 1, f"{threshold.name} of {rule.code} changes nothing"
 
 

@@ -122,9 +122,9 @@ class RecordedMotion(Movement):
                     had = " × ".join(map(str, column.shape)) or "one"
                     raise SettingError(f"'{name}' has {had} values for {counted(len(moments), 'time')}; give one each")
             rows = np.column_stack([np.empty((len(moments), 0)), *columns])
-            return cls._of_table(mechanism, StoTable("arrays", moments, tuple(source), rows))
+            return cls.of_table(mechanism, StoTable("arrays", moments, tuple(source), rows))
         result = source.mechanism.coordinates
-        return cls._of_table(
+        return cls.of_table(
             mechanism, StoTable("motion", source.times, tuple(info.path for info in result), source.values)
         )
 
@@ -141,10 +141,11 @@ class RecordedMotion(Movement):
                 or no column names one of the mechanism.
             ModelError: the mechanism has no coordinates.
         """
-        return cls._of_table(mechanism, read_sto(path))
+        return cls.of_table(mechanism, read_sto(path))
 
     @classmethod
-    def _of_table(cls, mechanism: Mechanism, table: StoTable) -> RecordedMotion:
+    def of_table(cls, mechanism: Mechanism, table: StoTable) -> RecordedMotion:
+        """The motion in a table; as of :meth:`read`."""
         if not len(table.times):
             raise DocumentError("the motion has no rows", file=table.file)
         values = np.tile(mechanism.values({}), (len(table.times), 1))

@@ -1,0 +1,178 @@
+"""A file of a finished trial under check: what was measured of it, for rules that compare this with limits.
+
+The linter computes without a numeric library: the numbers come from :mod:`osimlite.tools.trials`, which stands above.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite, nan
+from typing import ClassVar, NamedTuple
+
+from osimlite.document.source import Position
+from osimlite.lint.checked import Checked
+from osimlite.lint.config import Config, Threshold
+from osimlite.lint.diagnostic import Severity
+from osimlite.lint.engine import FindingSink
+
+TRIAL = "trial"
+"""What rules are about that need such numbers."""
+
+HICKS = "Hicks et al. 2015"
+"""Is my model good enough? Best practices for verification and validation of musculoskeletal models and simulations of
+movement. J Biomech Eng 137(2), 020905, https://doi.org/10.1115/1.4029304"""
+OPENSIM = "OpenSim's best practices"
+"""Simulation with OpenSim - Best Practices, https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686"""
+CHECKLIST = "OpenSim's checklist"
+"""For evaluating a simulation, https://simtk-confluence.stanford.edu:8443/plugins/viewsource/viewpagesrc.action?pageId=3376337"""
+OURS = "osimlite"
+"""Where nobody has published a limit."""
+
+GOOD, OKAY, BAD = VERDICTS = ("good", "okay", "bad")
+"""What a number is: within every limit, beyond the stricter of two, beyond all."""
+
+KINDS = {"peak": "the peak of "} | dict.fromkeys(("rms", "rms-translation"), "the root mean square of ")
+"""What stands before the name of what was measured."""
+
+
+class Number(NamedTuple):
+    """Something that was measured of a trial.
+
+    Attributes:
+        rule: name of the rule that judges it.
+        kind: what it is of a column of numbers: one of `KINDS`, or "".
+        of: what was measured, in words.
+        value: in the `unit`.
+        unit: N, N m, cm, deg, % or "".
+        scale: what a limit may be a part of, in the `unit`; NaN if that is not known.
+        where: at which time, of which marker, in words.
+        at: where that is in the file.
+        is_final: whether the trial goes on with it; else it is worth no more than an info.
+        side: what else is known, in words.
+    """
+
+    rule: str
+    kind: str
+    of: str
+    value: float
+    unit: str
+    scale: float = nan
+    where: str = ""
+    at: Position | None = None
+    is_final: bool = True
+    side: str = ""
+
+
+class Verdict(NamedTuple):
+    """A number with its limits.
+
+    Attributes:
+        code: of the rule.
+        name: of the rule.
+        of: what was measured, in words.
+        value: in the `unit`.
+        unit: N, N m, cm, deg, % or "".
+        good: up to which it is good.
+        bad: from which on it is bad.
+        verdict: one of `VERDICTS`.
+        source: of the limits.
+        where: at which time, of which marker, in words.
+        file: that it was measured of.
+        line: of the file, counted from 1.
+    """
+
+    code: str
+    name: str
+    of: str
+    value: float
+    unit: str
+    good: float
+    bad: float
+    verdict: str
+    source: str
+    where: str
+    file: str
+    line: int | None
+
+    @property
+    def shown(self) -> str:
+        """The number with its unit."""
+        return f"{_rounded(self.value)} {self.unit}".rstrip()
+
+    @property
+    def limits(self) -> str:
+        """Up to which it is good, and up to which it is okay."""
+        return " / ".join(dict.fromkeys((_rounded(self.good), _rounded(self.bad))))
+
+    @property
+    def words(self) -> str:
+        """What was measured, and where."""
+        return f"{self.of} ({self.where})" if self.where else self.of
+
+
+def _rounded(value: float) -> str:
+    return f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"
+
+
+class Trial(Checked):
+    """A file of a trial.
+
+    Args:
+        file: its path.
+        data: its bytes.
+        numbers: that were measured of it.
+        config: which rules run.
+    """
+
+    about: ClassVar[str] = TRIAL
+    file: str
+
+    def __init__(self, file: str, data: bytes, numbers: Sequence[Number], config: Config | None = None) -> None:
+        super().__init__(config)
+        self.file, self.data, self.numbers = file, data, numbers
+        self.verdicts: list[Verdict] = []
+
+    def judge(
+        self, found: FindingSink, limits: Sequence[Threshold | float], source: str, advice: str, kind: str = ""
+    ) -> None:
+        """Compare the numbers of a rule with limits: beyond the largest they are bad, beyond the least they are okay.
+
+        Args:
+            found: of the rule.
+            limits: settings, or numbers that are parts of what a number is compared with.
+            source: of the limits.
+            advice: what to look at.
+            kind: only numbers of this kind.
+        """
+        (rule,) = found.rules.values()
+        for number in self.numbers:
+            if number.rule != rule.name or number.kind != kind:
+                continue
+            parts = [
+                self.config.value_of(limit) * (number.scale / 100.0 if limit.unit == "%" != number.unit else 1.0)
+                if isinstance(limit, Threshold)
+                else limit
+                for limit in limits
+            ]
+            known = [limit for limit in parts if isfinite(limit)]
+            if not known:
+                continue
+            good, bad = min(known), max(known)
+            # What is no number is within no limit.
+            verdict = GOOD if number.value <= good else OKAY if number.value <= bad else BAD
+            self.verdicts.append(
+                Verdict(
+                    rule.code, rule.name, f"{KINDS.get(kind, '')}{number.of}", number.value, number.unit, good, bad,
+                    verdict, source, number.where, self.file, number.at.line if number.at is not None else None,
+                )
+            )  # fmt: skip
+            if verdict != GOOD:
+                unit = "" if not number.unit else f" {number.unit}" if number.unit != "%" else " %"
+                more = f", and more than {bad:.3g}{unit} is bad" if bad > good else ""
+                found(
+                    f"{KINDS.get(kind, '')}{number.of} is {_rounded(number.value)}{unit}"
+                    f"{f' ({number.where})' if number.where else ''}: up to {good:.3g}{unit} is good{more} ({source}); "
+                    f"{f'{number.side}; ' if number.side else ''}{advice}",
+                    at=number.at,
+                    severity=None if verdict == BAD and number.is_final else Severity.INFO,
+                )

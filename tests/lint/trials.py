@@ -1,0 +1,39 @@
+"""What was measured of a trial, as the examples and fixtures of rules about trials say it.
+
+A line for each number: ``peak of FY: 61 N, with loads of 850 N``.
+"""
+
+from __future__ import annotations
+
+import re
+
+from osimlite.document.source import Position
+from osimlite.lint.config import Config
+from osimlite.lint.diagnostic import Report
+from osimlite.lint.engine import Rule, run
+from osimlite.lint.trial import KINDS, Number, Trial
+
+LINE = re.compile(
+    r"(?P<kind>[a-z-]+)(?P<of> .*): (?P<value>[\d.]+) (?P<unit>[^,]*?)(, with .* of (?P<scale>[\d.]+) .*)?"
+)
+
+
+def trial_in(text: str, rule: Rule, config: Config | None = None) -> Trial:
+    """A file of a trial of which these numbers are, all of one rule."""
+    numbers = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        said = LINE.fullmatch(line)
+        assert said is not None, line
+        of = said["of"].removeprefix(" of ") if said["kind"] in KINDS else said["kind"] + said["of"]
+        numbers.append(
+            Number(
+                rule.name, said["kind"], of, float(said["value"]), said["unit"], float(said["scale"] or "nan"),
+                at=Position(number, 1),
+            )
+        )  # fmt: skip
+    return Trial("result.sto", text.encode(), numbers, config)
+
+
+def checked_trial(text: str, rule: Rule, config: Config | None = None) -> Report:
+    """What rules find in these numbers."""
+    return run(trial_in(text, rule, config))
