@@ -281,23 +281,17 @@ class StaticOptimization:
 
     def records(self, shared: Shared, values: Array, speeds: Array) -> StoTable:
         """What all forces report while actuators push so: the columns of OpenSim's ForceReporter."""
-        places = {path: k for k, path in enumerate(self._paths)}
-        elements = self._forces.elements
-        others = Forces(tuple(item for item in elements if item.path not in places))
+        elements, system = self._forces.elements, self._system
         labels = [label for item in elements for label in item.columns]
-        from_others = np.empty((len(shared.times), 0))
-        if any(item.columns for item in others.elements):
-            system = System(self.mechanism, others)
+        owners = [item.path for item in elements for _ in item.columns]
+        rows = np.zeros((len(shared.times), len(labels)))
+        if not {*owners} <= {*self._paths}:
             moments = zip(shared.times.tolist(), system.state.rows(values, speeds).tolist(), strict=True)
-            from_others = np.array([system.force_records(t, y) for t, y in moments])
-        columns, at, forces = [], 0, shared.forces
-        for item in elements:
-            if item.path in places:
-                columns.append(forces[:, [places[item.path]]])
-            else:
-                columns.append(from_others[:, at : at + len(item.columns)])
-                at += len(item.columns)
-        return StoTable(FORCES_TITLE, shared.times, tuple(labels), np.hstack(columns))
+            rows[:] = [system.force_records(t, y) for t, y in moments]
+        places = {path: k for k, path in enumerate(self._paths)}
+        own = [column for column, path in enumerate(owners) if path in places]
+        rows[:, own] = shared.forces[:, [places[owners[column]] for column in own]]
+        return StoTable(FORCES_TITLE, shared.times, tuple(labels), rows)
 
 
 def _idealised(model: Model, physiology: bool) -> list[ScalarActuator]:

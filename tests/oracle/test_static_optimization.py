@@ -1,0 +1,120 @@
+"""Static optimization beside OpenSim, live: never more effort, and the motion is the one that was asked for."""
+
+from __future__ import annotations
+
+import gzip
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.schema.muscles import Muscle
+from osimlite.simulation.files.storage import read_sto
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytestmark = pytest.mark.oracle
+
+CLASSES = ("Thelen2003Muscle", "Millard2012EquilibriumMuscle", "DeGrooteFregly2016Muscle")
+KEPT = ("max_isometric_force", "optimal_fiber_length", "tendon_slack_length", "pennation_angle_at_optimal",
+        "min_control", "max_control", "geometry_path")  # fmt: skip
+
+
+@pytest.fixture
+def arm(shared: Path, tmp_path: Path) -> Path:
+    """An arm with six muscles, whose controls are bounded; OpenSim's own test."""
+    place = shared / "oracle" / "tools" / "reference" / "so_arm26_bounds"
+    (tmp_path / "arm26_bounds.osim").write_bytes(gzip.decompress((place / "arm26_bounds.osim.gz").read_bytes()))
+    (tmp_path / "arm26_InverseKinematics.mot").write_bytes((place / "arm26_InverseKinematics.mot").read_bytes())
+    text = (place / "arm26_bounds_Setup_StaticOptimization.xml").read_text()
+    for results in ("ours", "theirs"):
+        own = re.sub("<results_directory>[^<]*<", f"<results_directory>{results}<", text)
+        (tmp_path / f"{results}.xml").write_text(own)
+    return tmp_path
+
+
+def with_muscles(file: Path, kind: str) -> None:
+    """Have all muscles of a model be of another class, with the same sizes."""
+    model = osimlite.read(file)
+    for place, muscle in enumerate(model.force_set.objects):
+        if isinstance(muscle, Muscle):
+            other = getattr(osimlite, kind)(name=muscle.name)
+            for name in KEPT:
+                setattr(
+                    other, name, getattr(muscle, name).copy_deep() if name == "geometry_path" else getattr(muscle, name)
+                )
+            model.force_set.objects[place] = other
+    osimlite.write(model, file)
+
+
+def moved(model: osimlite.Model, file: Path, forces: osimlite.simulation.StoTable) -> np.ndarray:
+    """Accelerations (t, n) of OpenSim's model under forces along the motion of the setup, in the order of its file."""
+    motion = osimlite.kinematics(model, file.parent / "arm26_InverseKinematics.mot", lowpass=6.0)
+    theirs = opensim.Model(str(file))
+    state = theirs.initSystem()
+    actuators = [opensim.ScalarActuator.safeDownCast(theirs.getForceSet().get(name)) for name in forces.columns]
+    for actuator in actuators:
+        actuator.overrideActuation(state, True)
+    names = motion.mechanism.coordinate_names
+    result = []
+    for row, time in zip(forces.rows, forces.times, strict=True):
+        at = int(np.argmin(abs(motion.times - time)))
+        assert motion.times[at] == pytest.approx(time, abs=1e-12)
+        for name, q, u in zip(names, motion.values[at], motion.rates[0][at], strict=True):
+            theirs.getCoordinateSet().get(name).setValue(state, float(q), False)
+            theirs.getCoordinateSet().get(name).setSpeedValue(state, float(u))
+        for actuator, force in zip(actuators, row, strict=True):
+            actuator.setOverrideActuation(state, float(force))
+        theirs.realizeAcceleration(state)
+        result.append([theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names])
+    return np.array(result)
+
+
+@pytest.mark.parametrize("kind", CLASSES)
+@pytest.mark.parametrize("exponent", [2, 3])
+def test_an_arm_with_muscles_of_other_classes(
+    arm: Path, monkeypatch: pytest.MonkeyPatch, kind: str, exponent: int
+) -> None:
+    monkeypatch.chdir(arm)
+    with_muscles(arm / "arm26_bounds.osim", kind)
+    for results in ("ours", "theirs"):
+        text = (arm / f"{results}.xml").read_text()
+        (arm / f"{results}.xml").write_text(re.sub("(<activation_exponent>)[^<]*<", rf"\g<1>{exponent}<", text))
+    done = osimlite.run(arm / "ours.xml", check=False)
+    script = "import opensim; opensim.Logger.setLevelString('Error'); assert opensim.AnalyzeTool('theirs.xml').run()"
+    subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=100)
+    (ours, our_forces), (theirs, their_forces) = (
+        [read_sto(next((arm / folder).glob(f"*_{end}.sto"))) for end in ("activation", "force")]
+        for folder in ("ours", "theirs")
+    )
+    assert ours.columns == theirs.columns and our_forces.columns == their_forces.columns
+    solved = ~np.isnan(ours.rows).any(axis=1)
+    assert solved.any() and done.done == solved.all()
+    x, other = ours.rows[solved], theirs.rows[solved]
+    # OpenSim's optimizer stops where its equations hold to 1e-4 only, which may save it effort.
+    assert (np.sum(abs(x) ** exponent, axis=1) <= (1.0 + 1e-3) * np.sum(abs(other) ** exponent, axis=1) + 1e-9).all()
+    mine = our_forces.rows[solved][:, [our_forces.columns.index(name) for name in ours.columns]]
+    yours = their_forces.rows[solved][:, [our_forces.columns.index(name) for name in ours.columns]]
+    pulls = abs(x) > 1e-6
+    assert (mine[pulls] / x[pulls] * other[pulls]) == pytest.approx(yours[pulls], rel=1e-9, abs=1e-8)
+
+
+def test_the_forces_give_the_accelerations_of_the_motion(arm: Path) -> None:
+    """OpenSim's own model moves so under them."""
+    file = arm / "arm26_bounds.osim"
+    model = osimlite.read(file)
+    found = osimlite.static_optimization(
+        model, arm / "arm26_InverseKinematics.mot", lowpass=6.0, start=0.4, end=0.9, folder=arm
+    )
+    assert found.solved.all() and found.forces is not None and found.motion is not None
+    moving = moved(model, file, found.forces)
+    around = osimlite.kinematics(model, arm / "arm26_InverseKinematics.mot", lowpass=6.0).around
+    assert around is not None
+    from osimlite.multibody.smoothing_spline import derivatives_of_samples
+
+    (speeds,) = derivatives_of_samples(*around, around[0], (1,), 3)
+    (wanted,) = derivatives_of_samples(around[0], speeds, found.times, (1,), 3)
+    assert moving == pytest.approx(wanted, rel=1e-9, abs=1e-8)
