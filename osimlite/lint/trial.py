@@ -31,6 +31,9 @@ OURS = "osimlite"
 GOOD, OKAY, BAD = VERDICTS = ("good", "okay", "bad")
 """What a number is: within every limit, beyond the stricter of two, beyond all."""
 
+LEAST = 0.001
+"""What is less is not shown with its digits."""
+
 KINDS = {"peak": "the peak of "} | dict.fromkeys(("rms", "rms-translation"), "the root mean square of ")
 """What stands before the name of what was measured."""
 
@@ -111,6 +114,8 @@ class Verdict(NamedTuple):
 
 
 def _rounded(value: float) -> str:
+    if 0.0 < value < LEAST:
+        return f"<{LEAST:g}"
     return f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"
 
 

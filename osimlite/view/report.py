@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from osimlite.document.kept import top_at
 from osimlite.errors import OsimliteError
 from osimlite.files import write_atomically
 from osimlite.fitting.fitted_motion import ADVICE
@@ -20,6 +21,8 @@ from osimlite.records import replace
 from osimlite.text import listed
 from osimlite.tools.evidence import Evidence, Steps, quietly_steps, root_of, side_of
 from osimlite.tools.outcome import DYNAMICS, Outcome
+from osimlite.tools.trials.check import check_trial
+from osimlite.tools.trials.folder import SETUPS
 from osimlite.view.lettering import plain_lettering
 from osimlite.view.plots import COLORS, STYLES, figure_of
 from osimlite.view.recording import MeasuredMarkers, Recording
@@ -41,6 +44,11 @@ p.note { color: #5a6675; margin: 4px 0 10px }
 table { border-collapse: collapse; margin: 8px 0 }
 td, th { padding: 2px 18px 2px 0; text-align: left; vertical-align: top }
 iframe { width: 100%; height: 600px; border: 1px solid #d7dde5; border-radius: 6px }
+td.number, .good, .okay, .bad { white-space: nowrap }
+td { overflow-wrap: break-word }
+.source { color: #5a6675; font-size: 13px }
+.good { color: #1a7f37 } .okay { color: #9a6700 } .bad { color: #cf222e; font-weight: 600 }
+ul.note { color: #5a6675; margin: 0 0 10px; padding-left: 20px; overflow-wrap: anywhere }
 img { max-width: 100%; height: auto; display: block }
 """
 
@@ -100,10 +108,11 @@ def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
     if all(trial.evidence is None for trial in trials):
         raise OsimliteError("there is nothing to report: none of the setups has a motion")
     with plain_lettering():
-        parts = "".join(_parts(trials))
+        parts = "".join([*_parts(trials), *_verdicts(outcomes)])
     title = html.escape(listed([trial.name for trial in trials]))
     page = (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" '
+        f'content="width=device-width, initial-scale=1"><title>{title}</title>'
         f"<style>{STYLE}</style></head><body><h1>{title}</h1>{parts}</body></html>\n"
     )
     write_atomically(path, page)
@@ -132,6 +141,31 @@ def _parts(trials: Sequence[Trial]) -> Iterator[str]:
         name = f": {trial.name}" if len(shown) > 1 else ""
         yield from _residuals(trial, name)
         yield from _errors(trial, name)
+
+
+def _verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
+    """What the results are worth by published limits."""
+    written = [file for outcome in outcomes.values() for file in outcome.files]
+    setups = [setup for setup in outcomes if type(top_at(str(setup))).__name__ in SETUPS]
+    try:
+        result = check_trial(*setups, written=written) if setups else None
+    except OsimliteError:
+        return
+    if result is None or not result.verdicts:
+        return
+    rows = "".join(
+        f'<tr><td class="{item.verdict}">{item.verdict}</td><td class="number">{html.escape(item.shown)}</td>'
+        f'<td class="number">{item.limits}</td><td>{html.escape(item.words)} '
+        f'<span class="source">{html.escape(item.source)}</span></td></tr>'
+        for item in result.worst
+    )
+    left = "".join(f"<li>{html.escape(why)}</li>" for why in result.unchecked)
+    left = f'<p class="note">Not looked at:</p><ul class="note">{left}</ul>' if left else ""
+    yield (
+        '<h2>Is it good enough?</h2><p class="note">The worst of each kind: good is within every published limit, okay '
+        "beyond the stricter of two, bad beyond all.</p><table><tr><th></th><th></th><th>limits</th><th></th></tr>"
+        f"{rows}</table>{left}"
+    )
 
 
 def _viewer(evidence: Evidence) -> str:

@@ -98,6 +98,21 @@ def test_a_page_for_two_trials_needs_nothing_else(trials: Path) -> None:
     assert [marker["name"] for marker in measured["markers"]] == ["one", "two", "three", "four"]
 
 
+def test_a_page_says_what_the_results_are_worth(trials: Path) -> None:
+    """The numbers are those of this run, wherever it wrote them, not of what lies beside the setups."""
+    words = [f"trial0/{name}.xml" for name in ("z_ik", "id")]
+    assert run("run", *words, folder=trials).code == 0
+    left = next(path for path in (trials / "trial0").glob("*.mot"))
+    left.write_text(left.read_text().replace("0.", "9.", 40))
+    results = {name: osimlite.run(trials / name, trials / "elsewhere") for name in words[:1]}
+    path = report({trials / name: outcome for name, outcome in results.items()}, trials / "worth.html")
+    part = path.read_text().partition("Is it good enough?")[2]
+    assert "the peak of the errors of the markers" in part and '<td class="good">good</td>' in part
+    assert "OpenSim&#x27;s best practices" in part
+    largest = 100.0 * results[words[0]].summary["largest_marker_error"]
+    assert f"{largest:.3g} cm" in part or "&lt;0.001 cm" in part
+
+
 def test_a_setup_that_fails_stops_no_report(trials: Path) -> None:
     (trials / "trial0" / "trial.trc").unlink()
     words = [f"trial{k}/{name}.xml" for k in range(2) for name in ("id", "z_ik")]

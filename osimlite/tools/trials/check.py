@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -84,6 +84,7 @@ def check_trial(
     select: tuple[str, ...] | list[str] | str | None = None,
     ignore: tuple[str, ...] | list[str] | str | None = None,
     config: Config | None = None,
+    written: Iterable[Path] = (),
     progress: Callable[[int, int], object] | None = None,
 ) -> TrialReport:
     """Check finished trials: is the model strong enough, are the data good?
@@ -93,6 +94,7 @@ def check_trial(
         select: codes, beginnings of codes, or names of rules to run; all that are about trials if not given.
         ignore: the same, of rules to leave out.
         config: everything that can be set; `select` and `ignore` take its place.
+        written: results of the setups that are in another place.
         progress: is told how many setups are done, of how many.
 
     Returns:
@@ -103,7 +105,7 @@ def check_trial(
         OsimliteError: there is nothing of a trial, or no rule has a code in `select` or `ignore`.
     """
     given = config or Config(checked_words(select), checked_words(ignore))
-    folder = Folder(paths or (".",))
+    folder = Folder(paths or (".",), written)
     numbers: dict[Path, list[Number]] = {}
     unchecked: dict[str, None] = {}
     looked: dict[str, None] = {}
@@ -178,7 +180,8 @@ def _measures(folder: Folder) -> Iterator[Measure]:
             yield from _of_optimization(tool, folder.tools, claimed)
         if tool.tag not in ("ScaleTool", "InverseKinematicsTool"):
             yield from _of_inputs(tool, looked)
-    yield from _without_setup(folder, claimed)
+    if folder.is_whole:
+        yield from _without_setup(folder, claimed)
 
 
 def _results(tool: Tool, ending: str) -> Path | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
@@ -47,14 +47,17 @@ class Folder:
 
     Args:
         paths: folders, of which everything below counts, or setups, of which the folder counts.
+        written: results of these setups, wherever they are; they count before others of their names.
 
     Raises:
         MissingFileError: a path is not there.
         OsimliteError: a file is no setup.
     """
 
-    def __init__(self, paths: Sequence[str | Path]) -> None:
+    def __init__(self, paths: Sequence[str | Path], written: Iterable[Path] = ()) -> None:
         self.tools: list[Tool] = []
+        self.is_whole = any(map(os.path.isdir, paths))
+        self._written = {file.name: file for file in written}
         self._kept: dict[Any, Any] = {}
         self._named: dict[str, list[Path]] = {}
         setups: dict[str, Path] = {}
@@ -88,6 +91,8 @@ class Folder:
 
     def near(self, path: Path) -> Path | None:
         """A file, or else one of its name that is nearest to its place; None if there is none."""
+        if path.name in self._written:
+            return self._written[path.name]
         if path.is_file():
             return Path(os.path.normpath(path))
 
