@@ -151,3 +151,13 @@ def test_a_locked_coordinate_stays_where_it_is() -> None:
     )
     found = osimlite.static_optimization(model, {"y": UP, "still": np.sin(TIMES)}, times=TIMES)
     assert found.solved.all() and found.rows == pytest.approx(free.rows, rel=1e-12)
+
+
+def test_loads_of_another_class_are_named(tmp_path: Path) -> None:
+    """Old documents have PrescribedForces in their ExternalLoads, which OpenSim refuses."""
+    (tmp_path / "loads.xml").write_text(
+        '<OpenSimDocument Version="20302"><ExternalLoads name=""><objects><PrescribedForce name="push"/></objects>'
+        "</ExternalLoads></OpenSimDocument>"
+    )
+    with pytest.raises(OsimliteError, match="'push' is a PrescribedForce, which OpenSim refuses here"):
+        osimlite.static_optimization(lift(30.0), {"y": UP}, tmp_path / "loads.xml", times=TIMES)

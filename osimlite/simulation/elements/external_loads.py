@@ -86,6 +86,11 @@ def read_external_loads(mechanism: Mechanism, source: str | Path | ExternalLoads
         raise DocumentError(f"{message}, or say so to inverse-dynamics by --applied-to", file=str(source))
     else:
         loads, folder, file = read_object(source, ExternalLoads), Path(source).parent, str(source)
+    for item in loads.objects:
+        if not isinstance(item, ExternalForce):
+            kind = getattr(item, "class_name", "") or type(item).__name__
+            message = f"'{item.name}' is a {kind}, which OpenSim refuses here; make it an ExternalForce"
+            raise DocumentError(message, file=file)
     forces = [force for force in loads.objects if force.appliesForce]
     columns = _Columns(loads_table(loads, folder, file), forces)
     return tuple(
