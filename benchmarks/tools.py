@@ -142,6 +142,11 @@ def cases(place: Path) -> Iterator[Case]:
     unpack(place / "id10", "id_gait10/*", "ik_gait10/subject01_walk_IK.mot", f"models/{ten}.gz")
     setup = dynamics(place / "id10", "walk_Setup_ID.xml", ten)
     yield Case("ID gait10", "InverseDynamicsTool", setup, 10, ("time_range", (0.0, 1.25)))
+    unpack(
+        place / "so10", "so_gait10/*.xml", "id_gait10/*_grf.*", "ik_gait10/subject01_walk_IK.mot", f"models/{ten}.gz"
+    )
+    setup = dynamics(place / "so10", "walk_Setup_SO.xml", ten, force_set_files=("gait10dof_Reserve_Actuators.xml",))
+    yield Case("StaticOptimization gait10", "AnalyzeTool", setup, 20, ("final_time", 1.0))
     unpack(place / "analyses", "analyses_gait10/*", "id_gait10/*_grf.mot.gz", f"models/{ten}.gz")
     folder = place / "analyses"
     shutil.copy(folder / ten, folder / "model.osim")
@@ -154,7 +159,7 @@ def cases(place: Path) -> Iterator[Case]:
     yield Case("Scale gait2354", "ScaleTool", place / "scale" / "scale.xml", 5)
 
 
-def dynamics(folder: Path, setup: str, model: str) -> Path:
+def dynamics(folder: Path, setup: str, model: str, **more: object) -> Path:
     """The setup of inverse dynamics with all its files in one folder."""
     return changed(
         folder,
@@ -162,6 +167,7 @@ def dynamics(folder: Path, setup: str, model: str) -> Path:
         model_file=model,
         coordinates_file="subject01_walk_IK.mot",
         external_loads_file="subject01_walk_grf.xml",
+        **more,
     )
 
 
