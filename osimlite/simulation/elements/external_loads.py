@@ -86,7 +86,8 @@ def read_external_loads(mechanism: Mechanism, source: str | Path | ExternalLoads
         raise DocumentError(f"{message}, or say so to inverse-dynamics by --applied-to", file=str(source))
     else:
         loads, folder, file = read_object(source, ExternalLoads), Path(source).parent, str(source)
-    for item in loads.objects:
+    members: list[Any] = [*loads.objects]
+    for item in members:
         if not isinstance(item, ExternalForce):
             kind = getattr(item, "class_name", "") or type(item).__name__
             message = f"'{item.name}' is a {kind}, which OpenSim refuses here; make it an ExternalForce"
