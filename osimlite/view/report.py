@@ -45,7 +45,7 @@ table { border-collapse: collapse; margin: 8px 0 }
 td, th { padding: 2px 18px 2px 0; text-align: left; vertical-align: top }
 iframe { width: 100%; height: 600px; border: 1px solid #d7dde5; border-radius: 6px }
 td.number, .good, .okay, .bad { white-space: nowrap }
-td { overflow-wrap: break-word }
+td { overflow-wrap: anywhere }
 .source { color: #5a6675; font-size: 13px }
 .good { color: #1a7f37 } .okay { color: #9a6700 } .bad { color: #cf222e; font-weight: 600 }
 ul.note { color: #5a6675; margin: 0 0 10px; padding-left: 20px; overflow-wrap: anywhere }
