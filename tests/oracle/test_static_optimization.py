@@ -118,3 +118,25 @@ def test_the_forces_give_the_accelerations_of_the_motion(arm: Path) -> None:
     (speeds,) = derivatives_of_samples(*around, around[0], (1,), 3)
     (wanted,) = derivatives_of_samples(around[0], speeds, found.times, (1,), 3)
     assert moving == pytest.approx(wanted, rel=1e-9, abs=1e-8)
+
+
+def test_actuators_in_the_place_of_muscles(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two for one coordinate and one for the other: the answer is known but for OpenSim's tolerance."""
+    monkeypatch.chdir(arm)
+    own = osimlite.ForceSet(name="own")
+    sizes = ("a", "r_shoulder_elev", 10.0), ("b", "r_elbow_flex", 5.0), ("c", "r_elbow_flex", 2.0)
+    for name, coordinate, force in sizes:
+        own.objects.append(osimlite.CoordinateActuator(name=name, coordinate=coordinate, optimal_force=force))
+    osimlite.write(own, arm / "own.xml")
+    for results in ("ours", "theirs"):
+        text = (arm / f"{results}.xml").read_text()
+        text = re.sub("<replace_force_set>[^<]*<", "<replace_force_set>true<", text)
+        text = re.sub(r"<force_set_files>[^<?]*</", "<force_set_files>own.xml</", text)
+        (arm / f"{results}.xml").write_text(text)
+    osimlite.run(arm / "ours.xml", check=False)
+    script = "import opensim; opensim.Logger.setLevelString('Error'); assert opensim.AnalyzeTool('theirs.xml').run()"
+    subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=100)
+    ours, theirs = (read_sto(next((arm / folder).glob("*_activation.sto"))) for folder in ("ours", "theirs"))
+    assert ours.columns == theirs.columns == ("a", "b", "c")
+    assert ours["b"] / ours["c"] == pytest.approx(np.full(len(ours.times), 2.5), rel=1e-9)
+    assert ours.rows == pytest.approx(theirs.rows, abs=1e-2 * abs(theirs.rows).max())
