@@ -95,8 +95,10 @@ def test_it_goes_through_the_points_and_is_natural(half_order, count, seed):
 def test_it_is_opensims(case):
     half_order, error_variance = case
     spline = smoothing_spline(X, Y, half_order, error_variance)
-    # The search for the smoothing ends a little apart from OpenSim's.
-    tolerance = 1e-11 if error_variance == 0.0 else 2e-5
+    # The search for the smoothing ends a little apart from OpenSim's. Degree 7 through unequal points costs digits:
+    # 1.1e-11 beside sixty digits on one processor, less than 1e-11 on others.
+    exact = 1e-11 if half_order < 4 else 1e-10
+    tolerance = exact if error_variance == 0.0 else 2e-5
     for x, expected in zip((0.0, 0.77, 3.3), OPENSIM[case], strict=True):
         assert _at(spline, x) == pytest.approx(expected, rel=tolerance, abs=tolerance)
 
