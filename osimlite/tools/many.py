@@ -145,14 +145,15 @@ def run_many(
 
 
 def _tell_clashes(trials: Sequence[Trial]) -> None:
-    """Results over which another setup has written are no results."""
+    """Results over which another setup has written are no results, and whose they are now depends on chance."""
     owners: dict[str, Trial] = {}
     for trial in trials:
         for file in map(os.path.realpath, trial.files):
             other = owners.setdefault(file, trial)
             if other is not trial:
-                trial.status = FAILED
-                trial.message = f"'{other.setup}' writes '{file}' too; give each a place of its own, or -o FOLDER"
+                for one, another in ((trial, other), (other, trial)):
+                    one.status = FAILED
+                    one.message = f"'{another.setup}' writes '{file}' too; give each a place of its own, or -o FOLDER"
 
 
 def places_of(setups: Sequence[Path], output: Path | None) -> dict[Path, Path | None]:
