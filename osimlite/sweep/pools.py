@@ -126,25 +126,31 @@ class _LocalPool:
     def submit(self, tag: Any, values: Any) -> None:
         """Have it done."""
         # Processes that begin now inherit that Ctrl-C is not for them.
-        with _sigint_held():
+        with _sigint_held(), _losses_told():
             future = self._executor.submit(self._work, values)
         future.add_done_callback(lambda done: self._done.put((tag, done)))
 
     def result(self, timeout: float | None = None) -> tuple[Any, Any]:
         """The next that is done."""
         tag, future = _next(self._done, timeout)
-        try:
+        with _losses_told():
             return tag, future.result()
-        except BrokenExecutor:
-            # New processes run the module anew that the program began with.
-            raise WorkerLostError(
-                "a process of the sweep has ended; a script begins a sweep under if __name__ == '__main__':, and what "
-                "was ended from outside goes on with --resume"
-            ) from None
 
     def close(self) -> None:
         """Stop what has not begun, and wait for the rest."""
         self._executor.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _losses_told() -> Iterator[None]:
+    try:
+        yield
+    except BrokenExecutor:
+        # New processes run the module anew that the program began with.
+        raise WorkerLostError(
+            "a process of the sweep has ended; a script begins a sweep under if __name__ == '__main__':, and what "
+            "was ended from outside goes on with --resume"
+        ) from None
 
 
 class ThreadPool(_LocalPool):

@@ -310,8 +310,8 @@ class _Work:
                 with processes(do, workers=workers, cluster=cluster) as pool:
                     while len(self.trials) < len(self.setups):
                         while len(under_way) < 2 * pool.workers and (setup := next(self.ready(), None)) is not None:
-                            pool.submit(setup, setup)
                             under_way.append(setup)
+                            pool.submit(setup, setup)
                         if not under_way:
                             break
                         setup, trial = pool.result()
