@@ -8,20 +8,15 @@ number in a list `laws` for its address.
 from __future__ import annotations
 
 import ast
-import builtins
-import inspect
 import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
-from textwrap import dedent
 from types import FunctionType
 from typing import Any
 
+from osimlite.backends.reader import Function, Kernel, name_of
 from osimlite.simulation.engines.sources import functions_within
 from osimlite.simulation.kernels import pointers
-from osimlite.simulation.kernels.layout import Record
-
-Kernel = Callable[..., Any]
 
 BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
 COMPARED = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "===", ast.NotEq: "!=="}
@@ -45,7 +40,7 @@ RESERVED = frozenset((
 """Names that a kernel may have and JavaScript not."""
 
 
-def as_javascript(laws: Sequence[Kernel], others: Sequence[Kernel] = ()) -> str:
+def as_javascript(laws: Sequence[Function], others: Sequence[Function] = ()) -> str:
     """Kernels, and all that they call, as the text of one expression: an object that has them.
 
     Args:
@@ -57,8 +52,8 @@ def as_javascript(laws: Sequence[Kernel], others: Sequence[Kernel] = ()) -> str:
     """
     every = dict.fromkeys(part for function in (*laws, *others) for part in functions_within(function))
     texts = "\n".join(_text(function) for function in every if function not in POINTERS)
-    numbered = ", ".join(("null", *map(_name, laws)))
-    named = "".join(f", {function.__name__}: {_name(function)}" for function in others)
+    numbered = ", ".join(("null", *map(name_of, laws)))
+    named = "".join(f", {function.__name__}: {name_of(function)}" for function in others)
     return f"(() => {{\n{MODULO}\n{texts}\nconst laws = [{numbered}];\nreturn {{ laws{named} }};\n}})()"
 
 
@@ -69,33 +64,21 @@ POINTERS: dict[Any, Callable[..., str]] = {
 """What the two operations on addresses are."""
 
 
-def _name(function: Kernel) -> str:
-    """Of a function among those of all modules."""
-    return f"{function.__module__.rpartition('.')[2]}_{function.__name__}"
-
-
 @cache
-def _text(function: Kernel) -> str:
-    (tree,) = ast.parse(dedent(inspect.getsource(function))).body
-    assert isinstance(tree, ast.FunctionDef)
-    return _Writer(function, tree).text()
+def _text(function: Function) -> str:
+    return _Writer(function, "JavaScript").text()
 
 
-class _Writer:
+class _Writer(Kernel):
     """Writes one function."""
 
-    def __init__(self, function: Kernel, tree: ast.FunctionDef) -> None:
-        self.function, self.tree, self.temporaries = function, tree, 0
-        self.given = [argument.arg for argument in tree.args.args]
-        stored = (n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store))
-        self.own = dict.fromkeys(name for name in stored if name not in self.given)
+    temporaries = 0
 
     def text(self) -> str:
-        body = self.tree.body[1:] if ast.get_docstring(self.tree) else self.tree.body
-        lines = self.block(body)
+        lines = self.block(self.body)
         names = [*map(_local, self.own), *(f"${k}" for k in range(self.temporaries))]
         declared = [f"let {', '.join(names)};"] if names else []
-        head = f"function {_name(self.function)}({', '.join(map(_local, self.given))}) {{"
+        head = f"function {self.name}({', '.join(map(_local, self.given))}) {{"
         return "\n".join((head, *declared, *lines, "}"))
 
     # ------------------------------------------------------------------------------------------- statements
@@ -201,7 +184,7 @@ class _Writer:
         if called in POINTERS:
             return POINTERS[called](*given)
         if isinstance(called, FunctionType):
-            name = _name(called)
+            name = name_of(called)
         elif called in CALLED:
             name = CALLED[called]
         elif called in vars(math).values():
@@ -217,18 +200,6 @@ class _Writer:
         if isinstance(value, int | float):
             return _number(value)
         raise self.unknown(node)
-
-    def value(self, node: ast.expr) -> Any:
-        """What a name means in the module of the function, or a field of a record there."""
-        if isinstance(node, ast.Attribute):
-            record = self.value(node.value)
-            return getattr(record, node.attr) if isinstance(record, Record) else None
-        name = node.id if isinstance(node, ast.Name) else ""
-        scope = self.function.__globals__
-        return scope[name] if name in scope else getattr(builtins, name, None)
-
-    def unknown(self, node: ast.AST) -> NotImplementedError:
-        return NotImplementedError(f"{_name(self.function)} has what is no JavaScript here: {ast.unparse(node)}")
 
 
 def _local(name: str) -> str:

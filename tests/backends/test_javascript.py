@@ -12,7 +12,7 @@ import pytest
 from osimlite.simulation.kernels.paths import pull_path
 from osimlite.simulation.kernels.pointers import at
 from osimlite.simulation.kernels.table import LAW_MODULES, law_function
-from osimlite.view.javascript import as_javascript
+from osimlite.backends.javascript import as_javascript
 
 TABLE = 3, 4
 
