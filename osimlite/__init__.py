@@ -2,8 +2,9 @@
 
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
 ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``inverse_kinematics``,
-``FrameSolver``, ``scale``, ``fit``, ``kinematics``, ``inverse_dynamics``, ``static_optimization``, ``run``,
-``check_trial``, ``report``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``).
+``FrameSolver``, ``scale``, ``fit``, ``kinematics``, ``inverse_dynamics``, ``static_optimization``, ``casadi``,
+``linearize``, ``run``, ``check_trial``, ``report``, the errors, and every component class under OpenSim's own name
+(``osimlite.PinJoint``).
 Names are imported when first used, so that importing osimlite costs nothing.
 """
 
@@ -15,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from osimlite.backends.functions import casadi as casadi
+    from osimlite.backends.linear import linearize as linearize
     from osimlite.document.plugins import classes_in as classes_in
     from osimlite.document.printer import to_text as to_text
     from osimlite.document.printer import write as write
@@ -46,12 +49,14 @@ if TYPE_CHECKING:
         "FrameSolver",
         "Model",
         "OsimliteError",
+        "casadi",
         "check_trial",
         "classes_in",
         "fit",
         "inverse_dynamics",
         "inverse_kinematics",
         "kinematics",
+        "linearize",
         "mechanism",
         "muscle_curves",
         "paths",
@@ -71,6 +76,7 @@ if TYPE_CHECKING:
     ]
 
 _FUNCTIONS = {
+    "casadi": "osimlite.backends.functions",
     "classes_in": "osimlite.document.plugins",
     "read": "osimlite.document.reader",
     "read_document": "osimlite.document.reader:read_any",
@@ -82,6 +88,7 @@ _FUNCTIONS = {
     "inverse_kinematics": "osimlite.fitting.inverse_kinematics",
     "fit": "osimlite.fitting.person",
     "scale": "osimlite.fitting.scale_tool",
+    "linearize": "osimlite.backends.linear",
     "mechanism": "osimlite.multibody:build_mechanism",
     "to_mjcf": "osimlite.translate",
     "to_urdf": "osimlite.translate",

@@ -10,7 +10,7 @@ from typing import Any
 
 from osimlite.backends import symbols, ways
 from osimlite.backends.reader import Function, Kernel, name_of, stored
-from osimlite.backends.symbols import COUNTERPARTS, UNSET, Vector
+from osimlite.backends.symbols import COUNTERPARTS, UNSET, NoFormula, Vector
 from osimlite.simulation.kernels import pointers
 from osimlite.simulation.kernels.trigonometry import sine_cosine
 
@@ -24,6 +24,7 @@ HELP = {
     "branch_": ways.Branch,
     "decide_": ways.decide,
     "fails_": ways.fails,
+    "is_nothing_": symbols.is_nothing,
     "unset_": UNSET,
 }
 """What the rewritten text calls."""
@@ -38,7 +39,11 @@ def _at(vector: Any, place: int) -> Any:
 
 def _call(address: int, *given: Any) -> int:
     law = pointers.laws[address]
-    result: int = ways.in_ways(f"the law {name_of(law)}", on_symbols(law), *given)
+    try:
+        result: int = ways.in_ways(f"the law {name_of(law)}", on_symbols(law), *given)
+    except NoFormula as error:
+        error.items.append(given[-1])
+        raise
     return result
 
 
@@ -59,6 +64,12 @@ def on_symbols(function: Any) -> Any:
     return _known[function]
 
 
+def taken(function: Any) -> Any:
+    """A function that takes symbols as it is, known as such from then on."""
+    _known[function] = function
+    return function
+
+
 class _Scope(dict[str, Any]):
     """The names of a module, each with its counterpart; these are made when they are first asked for."""
 
@@ -68,7 +79,7 @@ class _Scope(dict[str, Any]):
             value = function.__globals__.get(name, getattr(builtins, name, None))
             if _is_ours(value):
                 self[name] = _Later(value)
-            elif isinstance(value, type) and value not in COUNTERPARTS or not callable(value):
+            elif (isinstance(value, type) and value not in COUNTERPARTS) or not callable(value):
                 self[name] = value
             else:
                 self[name] = COUNTERPARTS.get(value, value)
@@ -167,6 +178,10 @@ class _Writer(Kernel, ast.NodeTransformer):
         return node
 
     def visit_If(self, node: ast.If) -> Any:
+        if _is_shortcut(node):
+            self.generic_visit(node)
+            node.test = _call_of("is_nothing_", node.test.left)  # type: ignore[attr-defined]
+            return node
         part, is_failure = self._part(node), self._is_failure(node)
         leaves = any(map(_leaves, (*node.body, *node.orelse)))
         names = stored(*node.body, *node.orelse)
@@ -203,6 +218,16 @@ class _Writer(Kernel, ast.NodeTransformer):
                 kind = returns.value if isinstance(returns, ast.Constant) else getattr(returns, "id", "")
                 return kind == "int" and ast.unparse(value) != "OUTCOME.OK"
         return False
+
+
+def _is_shortcut(node: ast.If) -> bool:
+    """Whether a round of a loop is left out for a number that is 0, which would change nothing."""
+    match node:
+        case ast.If(
+            test=ast.Compare(ops=[ast.Eq()], comparators=[ast.Constant(value=0.0)]), body=[ast.Continue()], orelse=[]
+        ):
+            return True
+    return False
 
 
 def _leaves(node: ast.AST) -> bool:

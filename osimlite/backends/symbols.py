@@ -8,12 +8,17 @@ nothing of it reaches the derivatives of the other side.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from osimlite._require import require
+from osimlite.errors import MissingDependency
 
+if "opensim" in sys.modules and "casadi" not in sys.modules:
+    # OpenSim has a library of the same name with other contents.
+    raise MissingDependency("casadi cannot be loaded where opensim is loaded already; take another process")
 casadi: Any = require("casadi", extra="casadi", purpose="a model as functions of CasADi")
 SX: Any = casadi.SX
 
@@ -26,6 +31,18 @@ class Unset:
 
 
 UNSET = Unset()
+
+
+class NoFormula(Exception):
+    """There is something in a kernel, or in how it is used, that has no meaning for symbols.
+
+    Attributes:
+        items: of the calls that led there, the innermost first.
+    """
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.items: list[int] = []
 
 
 class WiderWays(Exception):
@@ -227,6 +244,11 @@ def choose(test: Any, a: Callable[[], Any], b: Callable[[], Any], part: Any) -> 
     return merged(test, one, other, part)
 
 
+def is_nothing(value: Any) -> bool:
+    """Whether a number is 0 whatever the symbols are."""
+    return not is_symbol(value) and plain(value) == 0.0
+
+
 def smallest(*values: Any) -> Any:
     """`min`."""
     return _reduced(casadi.fmin, min, values)
@@ -253,7 +275,7 @@ def magnitude(value: Any) -> Any:
 def whole(value: Any) -> int:
     """`int`; a kernel that asks for the integer of a symbol has no formula."""
     if is_symbol(value):
-        raise NotImplementedError("a place in a table depends on the state")
+        raise NoFormula("a place in a table depends on the state")
     return int(plain(value))
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from osimlite.backends.symbols import UNSET, Vector, WiderWays, also, casadi, is_symbol, merged, plain, where
+from osimlite.backends.symbols import UNSET, NoFormula, Vector, WiderWays, also, casadi, is_symbol, merged, plain, where
 
 MOST_WAYS = 64
 """Through one function; what has more is refused."""
@@ -55,7 +55,7 @@ def repeated(function: Callable[[], Any]) -> Any:
             return function()
         except WiderWays as wider:
             if wider.part in run.wider:
-                raise NotImplementedError(f"{wider.part} depends on the state in a way that has no formula") from None
+                raise NoFormula(f"{wider.part} depends on the state in a way that has no formula") from None
             run.wider.add(wider.part)
         finally:
             Vector.journals.clear()
@@ -108,7 +108,7 @@ class Branch:
             yield bool(self.test)
             return
         before = where.condition
-        written = []
+        written: list[Writes] = []
         for side in (True, False):
             where.condition = before
             where.condition = also(self.test if side else casadi.logic_not(self.test))
@@ -116,7 +116,7 @@ class Branch:
             yield side
             written.append(_undone())
         where.condition = before
-        _write(_merged_writes(self.test, *written, self.part))
+        _write(_merged_writes(self.test, written[0], written[1], self.part))
 
     @property
     def end(self) -> tuple[Any, ...]:
@@ -134,7 +134,7 @@ def decide(part: str, test: Any) -> bool:
         return bool(test)
     frame = run.frame
     if frame is None:
-        raise NotImplementedError(f"{part} branches by the state")
+        raise NoFormula(f"{part} branches by the state")
     number = frame.at
     frame.at += 1
     if number == len(frame.taken):
@@ -176,7 +176,7 @@ def in_ways(part: str, function: Callable[..., Any], *given: Any) -> Any:
             frame.taken, frame.tests, frame.at = [*taken[:k], False], tests[: k + 1], 0
             frame.ways += 1
             if frame.ways > MOST_WAYS:
-                raise NotImplementedError(f"{part} has more than {MOST_WAYS} ways through it")
+                raise NoFormula(f"{part} has more than {MOST_WAYS} ways through it")
             where.condition = condition
             Vector.journals.append({})
             other, also_written = others(k + 1, function(*given))
@@ -190,4 +190,4 @@ def in_ways(part: str, function: Callable[..., Any], *given: Any) -> Any:
     return result
 
 
-__all__ = ["UNSET", "Branch", "decide", "fails", "in_ways", "repeated", "run"]
+__all__ = ["UNSET", "Branch", "NoFormula", "decide", "fails", "in_ways", "repeated", "run"]

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.backends.javascript import as_javascript
 from osimlite.simulation.kernels.layout import ITEM, LINK_WORK
 from osimlite.simulation.kernels.paths import pull_path
 from osimlite.simulation.kernels.table import law_function
 from osimlite.simulation.polylines import Polylines
-from osimlite.backends.javascript import as_javascript
 
 
 def routes_data(paths: Polylines) -> dict[str, Any] | None:

@@ -9,10 +9,10 @@ from math import sqrt
 import numpy as np
 import pytest
 
+from osimlite.backends.javascript import as_javascript
 from osimlite.simulation.kernels.paths import pull_path
 from osimlite.simulation.kernels.pointers import at
 from osimlite.simulation.kernels.table import LAW_MODULES, law_function
-from osimlite.backends.javascript import as_javascript
 
 TABLE = 3, 4
 

@@ -1,9 +1,7 @@
-"""A browser without a window, for the tests of the page."""
+"""The page in a browser without a window."""
 
 from __future__ import annotations
 
-import os
-import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,30 +9,7 @@ from typing import Any
 
 import pytest
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-
-FLAGS = [
-    "--no-sandbox",
-    "--disable-dev-shm-usage",
-    # Three dimensions drawn in software: there may be no graphics card.
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
-]
-
-
-# Not for the whole session: as long as Playwright is there, an event loop runs, and tests of coroutines cannot.
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    """Chromium, driven by Playwright; OSIMLITE_CHROMIUM names its program if it is not on the PATH."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (extra 'dev')")
-    program = os.environ.get("OSIMLITE_CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)), None)
-    if program is None:
-        pytest.skip("needs Chromium on the PATH, or its program in OSIMLITE_CHROMIUM")
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=program, args=FLAGS)
-        yield browser
-        browser.close()
+from tests.browser import chromium as chromium
 
 
 class Page:

@@ -1,0 +1,362 @@
+"""A model as functions of CasADi: values and exact derivatives for optimisation and analysis."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from osimlite.errors import SettingError
+from osimlite.multibody import build_mechanism
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.records import replace
+from osimlite.schema.model import Model, expect_model
+from osimlite.simulation.constrained import kept_state
+from osimlite.simulation.elements import Forces, force_elements
+from osimlite.simulation.elements.probe import DeclaredProbe
+from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, STAGE
+from osimlite.simulation.kernels.pack import Packed, pack
+from osimlite.simulation.states import StateLayout, in_model_order
+
+if TYPE_CHECKING:
+    from osimlite.backends.traced import Evaluated, Traced
+
+FUNCTIONS = "dynamics", "residual", "constraints", "outputs", "paths"
+"""Those that `save` writes."""
+
+
+def casadi(model: Model, parameters: Iterable[str] = (), folder: str | Path | None = None) -> CasadiModel:
+    """A model as functions of CasADi, made of the same laws that simulate it.
+
+    Args:
+        model: what moves.
+        parameters: numbers of the model that stay symbols, by path: ``/bodyset/torso/mass``, ``/forceset/soleus_r/
+            max_isometric_force``, ``/bodyset/torso/mass_center/1``; one path may stand for several that are the same.
+        folder: where the model's file is, for the files that it names; the folder that the program runs in if None.
+
+    Raises:
+        MissingDependency: casadi is not installed, or cannot be loaded beside what is loaded already.
+        ModelError: the model is not a mechanism.
+        SettingError: there is no such number.
+        UnsupportedError: a part of the model has no formula, or a number cannot stay a symbol; the message names it.
+    """
+    expect_model(model)
+    return CasadiModel(model, tuple(parameters), Path(folder or "."))
+
+
+class CasadiModel:
+    """Functions of CasADi (``casadi.Function``), each made when it is first asked for.
+
+    All are functions of columns: time t (s); the state x, named by `states`; its derivative xdot; the controls u of the
+    actuators, named by `controls`, in the place of what the model's controllers say (to which a stretch reflex adds);
+    the parameters p, named by `parameters`. Units are those of OpenSim's files of states: m, rad, s, N.
+    Where a result does not exist (a joint stands where its rates are not defined), it is not a number.
+
+    Args:
+        model: what moves.
+        parameters: paths of numbers that stay symbols.
+        folder: of the model's file.
+
+    Attributes:
+        name: of the model.
+        states: the entries of x as in ``states.sto``: values, speeds, and then auxiliary states, each in the order of
+            the model. Coordinates that are locked are none.
+        controls: the entries of u: paths of the actuators.
+        parameters: the entries of p.
+        p: the values (p,) that the model has for these.
+        x: the state (x,) that the model starts from, where its constraints hold.
+        u: controls (u,) of zero.
+        coordinates: paths of the coordinates whose accelerations are found, in the order of the speeds.
+        constraints_kept: how many equations constrain the motion.
+    """
+
+    def __init__(self, model: Model, parameters: Sequence[str], folder: Path) -> None:
+        # Before all else: it says what is missing.
+        from osimlite.backends.symbols import casadi as library
+
+        self._library, self._folder = library, folder
+        # Whether bodies stay apart decides what is linear in masses and places.
+        self._apart = bool(parameters)
+        self._take(model)
+        self.name = model.name or "model"
+        self.parameters = tuple(parameters)
+        infos = self.mechanism.coordinates
+        own = [f"{infos[place].path}/{what}" for what in ("value", "speed") for place in self._packed.order]
+        moving, paths = len(own), self._state.paths
+        self.coordinates = tuple(path.rpartition("/")[0] for path in in_model_order(model, own[: moving // 2]))
+        values, speeds = ([f"{path}/{what}" for path in self.coordinates] for what in ("value", "speed"))
+        self.states = (*values, *speeds, *in_model_order(model, paths))
+        names = {name: place for place, name in enumerate([*own, *paths])}
+        self._places = [names[name] for name in self.states]
+        self.controls = self.forces.controls.names
+        self.u = np.zeros(len(self.controls))
+        start, rates = kept_state(
+            self.mechanism, [i.default_value for i in infos], [i.default_speed for i in infos], (), ()
+        )
+        self.x = np.array(self._state.pack(start.tolist(), rates.tolist()))[self._places]
+        self._parameters = self._symbolic(model)
+        self.p = self._parameters.values if self._parameters else np.zeros(0)
+        at_equations = self._packed.structure[MODEL.CONSTRAINED]
+        self.constraints_kept = int(self._packed.structure[at_equations + CONSTRAINED.EQUATIONS]) if at_equations else 0
+        self._symbols = {
+            "t": library.SX.sym("t"),
+            "x": library.SX.sym("x", len(self.states)),
+            "xdot": library.SX.sym("xdot", len(self.states)),
+            "u": library.SX.sym("u", len(self.controls)),
+            "p": library.SX.sym("p", len(self.parameters)),
+            "multipliers": library.SX.sym("multipliers", self.constraints_kept),
+        }
+        # What has no formula is refused at once.
+        self._traced  # noqa: B018
+
+    def _take(self, model: Model) -> None:
+        self.mechanism: Mechanism = build_mechanism(model)
+        self.forces = self._forces_of(model, self.mechanism)
+        self._packed: Packed = pack(self.mechanism, self.forces, apart=self._apart)
+        self._state = StateLayout(self.mechanism, self._packed.order, self.forces.elements)
+
+    def _forces_of(self, model: Model, mechanism: Mechanism) -> Forces:
+        forces = force_elements(model, mechanism, folder=self._folder)
+        return replace(forces, elements=tuple(e for e in forces.elements if not isinstance(e, DeclaredProbe)))
+
+    def _symbolic(self, model: Model) -> Any:
+        if not self.parameters:
+            return None
+        from osimlite.backends.parameters import Parameters
+
+        structure = self._packed.structure
+
+        def numbers_of(changed: Model) -> Array:
+            mechanism = build_mechanism(changed)
+            packed = pack(mechanism, self._forces_of(changed, mechanism), apart=self._apart)
+            if not np.array_equal(packed.structure, structure):
+                return np.zeros(0)
+            return np.concatenate((packed.numbers, _station_numbers(mechanism, packed)))
+
+        return Parameters(model.copy_deep(), self.parameters, numbers_of)
+
+    # ----------------------------------------------------------------------------------------------- tracing
+    @cached_property
+    def _traced(self) -> Traced:
+        from osimlite.backends.constraints import independent_equations
+        from osimlite.backends.parameters import filled
+        from osimlite.backends.traced import Traced
+
+        numbers = self._packed.numbers.tolist()
+        if self._parameters:
+            numbers = filled(self._parameters.base.tolist(), self._parameters.slopes, self._entries("p"))
+        equations = independent_equations(self.mechanism, self._packed, self._state) if self.constraints_kept else ()
+        return Traced(
+            self._packed,
+            self.forces,
+            numbers,
+            self._symbols["t"],
+            self._engine_order("x"),
+            self._entries("u"),
+            equations,
+        )
+
+    def _entries(self, name: str) -> list[Any]:
+        symbol = self._symbols[name]
+        return [symbol[k] for k in range(symbol.numel())]
+
+    def _engine_order(self, name: str) -> list[Any]:
+        result: list[Any] = [0.0] * len(self.states)
+        for place, entry in zip(self._places, self._entries(name), strict=True):
+            result[place] = entry
+        return result
+
+    def _in_order(self, y: Sequence[Any]) -> list[Any]:
+        return [y[place] for place in self._places]
+
+    @cached_property
+    def _evaluated(self) -> Evaluated:
+        return self._traced.evaluated(STAGE.ACCELERATION)
+
+    def _function(self, name: str, given: Sequence[str], results: dict[str, Any]) -> Any:
+        symbols = [self._symbols[item] for item in given]
+        return self._library.Function(name, symbols, [*results.values()], [*given], [*results])
+
+    # --------------------------------------------------------------------------------------------- functions
+    @cached_property
+    def dynamics(self) -> Any:
+        """``dynamics(t, x, u, p) -> xdot``: the derivative of the state."""
+        found = self._evaluated
+        return self._function("dynamics", ("t", "x", "u", "p"), {"xdot": found.sure(self._in_order(found.f.cells))})
+
+    @cached_property
+    def linear(self) -> Any:
+        """``linear(t, x, u, p) -> xdot, A, B``: the same with its exact derivatives by the state and the controls."""
+        given = "t", "x", "u", "p"
+        xdot = self.dynamics(*(self._symbols[name] for name in given))
+        slopes = {name: self._library.jacobian(xdot, self._symbols[key]) for name, key in (("A", "x"), ("B", "u"))}
+        return self._function("linear", given, {"xdot": xdot, **slopes})
+
+    @cached_property
+    def residual(self) -> Any:
+        """``residual(t, x, xdot, u, p, multipliers) -> residual``: zero where a motion is one of the model.
+
+        In the order of the state: what the rates of values are beyond those that follow from the speeds (rad/s, m/s);
+        the generalized forces M udot + c - f + Gᵀ multipliers (N, N m); what the rates of auxiliary states are beyond
+        those that the laws give. The multipliers (N, N m) are those of the rows of G in `constraints`; none without.
+        """
+        size, xdot = len(self.coordinates), self._engine_order("xdot")
+        found = self._traced.missing(xdot[size : 2 * size])
+        f = found.f.cells
+        rows = [given - own for given, own in zip(xdot, f, strict=True)]
+        rows[size : 2 * size] = f[size : 2 * size]
+        if self.constraints_kept:
+            push = self._bound["jacobian"].T @ self._symbols["multipliers"]
+            rows[size : 2 * size] = [rows[size + k] + push[self._speed_place(k)] for k in range(size)]
+        given = "t", "x", "xdot", "u", "p", "multipliers"
+        return self._function("residual", given, {"residual": found.sure(self._in_order(rows))})
+
+    def _speed_place(self, k: int) -> int:
+        """Number among `coordinates` of a degree of freedom."""
+        return self._places.index(k)
+
+    @cached_property
+    def constraints(self) -> Any:
+        """``constraints(t, x, xdot, p) -> position, velocity, acceleration, jacobian``: zero where they hold.
+
+        The errors of the equations that bind positions (rad, m), of all in speeds (G u less what it is to be), and in
+        accelerations (likewise G udot); G (m, n) has a row for each equation and a column for each of `coordinates`.
+        """
+        return self._function("constraints", ("t", "x", "xdot", "p"), self._bound)
+
+    @cached_property
+    def _bound(self) -> dict[str, Any]:
+        from osimlite.backends.constraints import position_equations
+
+        size, count, column = len(self.coordinates), self.constraints_kept, self._library.vertcat
+        if not count:
+            nothing = self._library.SX(0, 1)
+            empty = self._library.SX(0, size)
+            return {"position": nothing, "velocity": nothing, "acceleration": nothing, "jacobian": empty}
+        found, structure = self._traced.bound(), self._traced.structure
+        h, w = structure[structure[MODEL.CONSTRAINED] :], found.w
+        order = [self._places.index(k) for k in range(size)]
+        rows = []
+        for number in range(count):
+            first = h[CONSTRAINED.WORK_ROWS] + size * number
+            row = [0.0] * size
+            for k, place in enumerate(order):
+                row[place] = w[first + k]
+            rows.append(self._library.horzcat(*row))
+        jacobian = self._library.sparsify(self._library.SX(column(*rows)))
+        u, udot = self._symbols["x"][size : 2 * size], self._symbols["xdot"][size : 2 * size]
+
+        def wanted(place: int) -> Any:
+            return column(*w[h[place] : h[place] + count])
+
+        errors = [w[h[CONSTRAINED.WORK_ERRORS] + number] for number in position_equations(structure)]
+        return {
+            "position": self._library.SX(column(*errors)),
+            "velocity": jacobian @ u - wanted(CONSTRAINED.WORK_RATES),
+            "acceleration": jacobian @ udot - wanted(CONSTRAINED.WORK_DRIFTS),
+            "jacobian": jacobian,
+        }
+
+    @cached_property
+    def outputs(self) -> Any:
+        """``outputs(t, x, u, p) -> ...``: columns whose entries are named by `output_names`.
+
+        ``stations``, ``station_velocities``: of markers and other stations in ground (m, m/s); ``mass_center``,
+        ``mass_center_velocity``; ``contact_forces``: of each pair the force in ground (N) on the second surface, or on
+        the sphere, and its point (m); ``forces``: what is known of each force, such as ``tension`` (N), ``activation``,
+        ``fiber_length`` (m), ``cos_pennation``, ``active_fiber_force`` (N).
+        """
+        return self._function(
+            "outputs", ("t", "x", "u", "p"), {key: column for key, (_, column) in self._outputs.items()}
+        )
+
+    @cached_property
+    def output_names(self) -> dict[str, tuple[str, ...]]:
+        """By the outputs of `outputs`, the names of their entries."""
+        return {name: tuple(labels) for name, (labels, _) in self._outputs.items()}
+
+    @cached_property
+    def _outputs(self) -> dict[str, tuple[list[str], Any]]:
+        from osimlite.backends.outputs import output_columns
+
+        stations = self._station_points()
+        return output_columns(self.mechanism, self._packed, self.forces, self._evaluated, stations)
+
+    def _station_points(self) -> list[Any]:
+        if not self._parameters:
+            return _station_numbers(self.mechanism, self._packed).tolist()
+        return [*self._traced.numbers[len(self._packed.numbers) :]]
+
+    @cached_property
+    def paths(self) -> Any:
+        """``paths(t, x, p) -> lengths, speeds, moment_arms``: of the paths of `path_names`.
+
+        Lengths (m), lengthening speeds (m/s), and the moment arms (m, or 1 of sliding coordinates) about each of
+        `coordinates` (k, n): the generalized force of a tension of 1 N.
+        """
+        _, lengths, speeds = self._paths
+        size = len(self.coordinates)
+        arms = -self._library.jacobian(speeds, self._symbols["x"])[:, size : 2 * size]
+        return self._function("paths", ("t", "x", "p"), {"lengths": lengths, "speeds": speeds, "moment_arms": arms})
+
+    @cached_property
+    def path_names(self) -> tuple[str, ...]:
+        """Paths of the forces along the paths."""
+        return tuple(self._paths[0])
+
+    @cached_property
+    def _paths(self) -> tuple[list[str], Any, Any]:
+        from osimlite.backends.outputs import path_entries
+
+        return path_entries(self._packed, self.forces, self._evaluated)
+
+    # ------------------------------------------------------------------------------------------------- files
+    def save(self, folder: str | Path, functions: Iterable[str] = FUNCTIONS) -> list[Path]:
+        """Write the functions into a folder: each as ``NAME.casadi``, and all together as C.
+
+        ``casadi.Function.load`` reads the former without osimlite; ``model.c`` and ``model.h`` need only a compiler.
+        ``model.json`` has the names of the states, controls and parameters, and the numbers to start from.
+
+        Args:
+            folder: is made.
+            functions: those that are written.
+
+        Raises:
+            SettingError: there is no such function.
+        """
+        names, folder = [*functions], Path(folder)
+        if unknown := [name for name in names if name not in FUNCTIONS]:
+            raise SettingError(f"there is no function '{unknown[0]}'; there are {', '.join(FUNCTIONS)}")
+        folder.mkdir(parents=True, exist_ok=True)
+        written = []
+        generator = self._library.CodeGenerator("model.c", {"with_header": True})
+        for name in names:
+            function = getattr(self, name)
+            written.append(folder / f"{name}.casadi")
+            function.save(str(written[-1]))
+            generator.add(function)
+        # The generator takes the folder for the beginning of a name.
+        generator.generate(f"{folder}/")
+        facts = {
+            "model": self.name,
+            "states": self.states,
+            "controls": self.controls,
+            "parameters": self.parameters,
+            "x": self.x.tolist(),
+            "p": self.p.tolist(),
+            "functions": {name: str(getattr(self, name)) for name in names},
+        }
+        (folder / "model.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
+        return [*written, folder / "model.c", folder / "model.h", folder / "model.json"]
+
+
+def _station_numbers(mechanism: Mechanism, packed: Packed) -> Array:
+    """Points in their links of all stations (3 k,)."""
+    from osimlite.backends.outputs import station_places
+
+    return np.array([number for _, _, point in station_places(mechanism, packed) for number in point])

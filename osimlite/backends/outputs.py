@@ -1,0 +1,116 @@
+"""What is known of a state besides its derivative, as formulas: where points are, forces, muscles, paths."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from osimlite.backends.symbolic import on_symbols
+from osimlite.backends.traced import Evaluated
+from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.contact import PairContact
+from osimlite.simulation.elements.geometries.path import PATH
+from osimlite.simulation.elements.geometries.sphere_on_plane import SPHERE_ON_PLANE
+from osimlite.simulation.elements.items import Places
+from osimlite.simulation.elements.kind import DeclaredForce
+from osimlite.simulation.kernels.layout import INERTIA_AT, MODEL
+from osimlite.simulation.kernels.pack import Packed
+from osimlite.simulation.kernels.paths import LENGTH, SPEED
+from osimlite.simulation.kernels.points import station, velocity
+
+AXES = "xyz"
+
+
+def station_places(mechanism: Mechanism, packed: Packed) -> list[tuple[str, int, tuple[float, ...]]]:
+    """Of every station its path, its link, and where in that it is."""
+    places = Places(mechanism, {}, packed.placements)
+    return [(path, *places.station(body, point.tolist())) for path, (body, point) in mechanism.stations.items()]
+
+
+def output_columns(
+    mechanism: Mechanism, packed: Packed, forces: Forces, found: Evaluated, points: Sequence[Any]
+) -> dict[str, tuple[list[str], Any]]:
+    """Columns and the names of their entries, as of `CasadiModel.outputs`.
+
+    Args:
+        mechanism: of the model.
+        packed: the same.
+        forces: of it.
+        found: of the state.
+        points: in their links, of all stations (3 k,), which may be symbols.
+    """
+    at_station, speed_of = on_symbols(station), on_symbols(velocity)
+    labels: list[str] = []
+    places: list[Any] = []
+    speeds: list[Any] = []
+    for number, (path, link, _) in enumerate(station_places(mechanism, packed)):
+        labels += [f"{path}|{axis}" for axis in AXES]
+        point = at_station(found.s, found.w, link, tuple(points[3 * number : 3 * number + 3]))
+        places += point
+        speeds += speed_of(found.s, found.w, link, point)
+    center, rate = _mass_center(mechanism, packed, found)
+    pushed = _contacts(packed, forces, found)
+    known = [
+        (f"{element.path}|{name}", found.w[items[-1][0] + place])
+        for element, items in zip(forces.elements, packed.items, strict=True)
+        if isinstance(element, DeclaredForce) and items
+        for name, place in element.kind.recorded.items()
+    ]
+    return {
+        "stations": (labels, found.sure(places)),
+        "station_velocities": (labels, found.sure(speeds)),
+        "mass_center": ([*AXES], found.sure(center)),
+        "mass_center_velocity": ([*AXES], found.sure(rate)),
+        "contact_forces": ([name for name, _ in pushed], found.sure([value for _, value in pushed])),
+        "forces": ([name for name, _ in known], found.sure([value for _, value in known])),
+    }
+
+
+def _mass_center(mechanism: Mechanism, packed: Packed, found: Evaluated) -> tuple[list[Any], list[Any]]:
+    """Where the mass centre of all bodies is, and how it moves."""
+    parts = []
+    for link in range(int(packed.structure[MODEL.LINKS])):
+        first = INERTIA_AT + 10 * link
+        parts.append((found.x[first], link, tuple(found.x[first + 1 : first + 4])))
+    for placement, body in zip(packed.placements, mechanism.bodies, strict=True):
+        if placement.link == GROUND:
+            own, frame = body.mass_properties, placement.frame
+            parts.append((own.mass, GROUND, tuple((frame[:3, :3] @ own.center + frame[:3, 3]).tolist())))
+    total, center, rate = 0.0, [0.0] * 3, [0.0] * 3
+    for mass, link, point in parts:
+        place = on_symbols(station)(found.s, found.w, link, point)
+        moves = on_symbols(velocity)(found.s, found.w, link, place)
+        total = total + mass
+        center = [a + mass * b for a, b in zip(center, place, strict=True)]
+        rate = [a + mass * b for a, b in zip(rate, moves, strict=True)]
+    return [a / total for a in center], [a / total for a in rate]
+
+
+def _contacts(packed: Packed, forces: Forces, found: Evaluated) -> list[tuple[str, Any]]:
+    """Force and point of each contact, which stand at the beginning of what the kernels know of it."""
+    pairs: list[tuple[str, int]] = []
+    for element, items in zip(forces.elements, packed.items, strict=True):
+        if isinstance(element, PairContact):
+            folder = element.path.rpartition("/")[0]
+            pairs += [(f"{folder}/{element.pair_name(k)}", place) for k, (place, _) in enumerate(items)]
+        elif isinstance(element, DeclaredForce) and element.kind.geometry is SPHERE_ON_PLANE and items:
+            pairs.append((element.path, items[-1][0] + len(element.kind.recorded)))
+    return [
+        (f"{name}|{what}_{axis}", found.w[place + 3 * part + k])
+        for name, place in pairs
+        for part, what in enumerate(("force", "point"))
+        for k, axis in enumerate(AXES)
+    ]
+
+
+def path_entries(packed: Packed, forces: Forces, found: Evaluated) -> tuple[list[str], Any, Any]:
+    """Names, lengths and lengthening speeds of all paths along which something pulls."""
+    names, lengths, speeds = list[str](), list[Any](), list[Any]()
+    for element, items in zip(forces.elements, packed.items, strict=True):
+        if isinstance(element, DeclaredForce) and element.kind.geometry is PATH and len(items) > 1:
+            record = items[-2][0]
+            names.append(element.path)
+            lengths.append(found.w[record + LENGTH])
+            speeds.append(found.w[record + SPEED])
+    return names, found.sure(lengths), found.sure(speeds)

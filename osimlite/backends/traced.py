@@ -1,0 +1,147 @@
+"""A packed model evaluated on symbols: the kernels themselves, run on numbers of which some are symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import reduce
+from typing import Any
+
+from osimlite.backends import ways
+from osimlite.backends.constraints import dynamics_with
+from osimlite.backends.symbolic import on_symbols, taken
+from osimlite.backends.symbols import Vector, casadi
+from osimlite.errors import UnsupportedError
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.engines.linking import PYTHON, Program
+from osimlite.simulation.kernels.constrained_dynamics import bind
+from osimlite.simulation.kernels.dynamics import evaluate, inverse
+from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, STAGE, WORK
+from osimlite.simulation.kernels.pack import Packed
+from osimlite.simulation.kernels.pointers import address
+
+WRAPS = "its path bends around surfaces; put a FunctionBasedPath that is fitted to it in its place"
+MESH = "a mesh is in contact; take spheres and half spaces"
+CLOSEST = "the point of an ellipsoid that is in contact is searched for; take spheres"
+SURFACES = "what touches is said at the sizes of a state that is known only later; leave simbody_early_return out"
+REFUSED = {
+    "wrapped_path": WRAPS,
+    "geodesic_path": WRAPS,
+    "cable_path": WRAPS,
+    "touch_mesh": MESH,
+    "elastic_foundation_force": MESH,
+    "touch_ellipsoid": CLOSEST,
+    "touch_ellipsoids": CLOSEST,
+    "early_return": SURFACES,
+}
+"""By the names of kernels, why they have no formula, and what to do instead."""
+
+
+class Traced:
+    """What the kernels compute of a state of symbols.
+
+    Args:
+        packed: the model.
+        forces: of it.
+        numbers: of it, some of which may be symbols.
+        t: time, s.
+        y: the state, in the order of the packed model.
+        controls: of the actuators.
+        equations: numbers of those of the constraints that the others follow from.
+
+    Raises:
+        UnsupportedError: a force has no formula; the message names it.
+    """
+
+    def __init__(
+        self,
+        packed: Packed,
+        forces: Forces,
+        numbers: Sequence[Any],
+        t: Any,
+        y: Sequence[Any],
+        controls: Sequence[Any],
+        equations: Sequence[int] = (),
+    ) -> None:
+        self._packed, self._elements = packed, forces.elements
+        self.numbers, self._t, self._y, self._controls = numbers, t, y, controls
+        for place, kernel in packed.kernels.items():
+            if place in packed.owners and (not isinstance(kernel, str) or kernel in REFUSED):
+                reason = REFUSED[kernel] if isinstance(kernel, str) else "it is computed in Python"
+                raise UnsupportedError(f"'{self._path(place)}' has no formula for CasADi: {reason}")
+        self.structure: list[int] = Program(packed, PYTHON).ints.tolist()
+        # The controls are given, whatever the controllers of the model say.
+        self.structure[MODEL.CONTROLS] = 0
+        if self.structure[MODEL.CONSTRAINED]:
+            law = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.DYNAMICS]
+            self.structure[MODEL.LAWS + law] = address(taken(dynamics_with(equations)))
+
+    def _path(self, item: int) -> str:
+        return self._elements[self._packed.owners[item]].path
+
+    def evaluated(self, stage: int) -> Evaluated:
+        """All that `evaluate` finds up to a stage."""
+        return self.run(lambda s, x, w, y, f: on_symbols(evaluate)(s, x, w, y, f, stage))
+
+    def missing(self, udot: Sequence[Any]) -> Evaluated:
+        """What `inverse` finds for accelerations (n,)."""
+        size = self.structure[MODEL.DOFS]
+
+        def law(s: Vector, x: Vector, w: Vector, y: Vector, f: Vector) -> None:
+            for k in range(size):
+                f[size + k] = udot[k]
+            on_symbols(inverse)(s, x, w, y, f, 0)
+
+        return self.run(law)
+
+    def bound(self) -> Evaluated:
+        """The equations of the constraints, see `bind`."""
+
+        def law(s: Vector, x: Vector, w: Vector, y: Vector, f: Vector) -> None:
+            on_symbols(evaluate)(s, x, w, y, f, STAGE.VELOCITY)
+            on_symbols(bind)(s, x, w, y, f)
+
+        return self.run(law)
+
+    def run(self, law: Callable[[Vector, Vector, Vector, Vector, Vector], Any]) -> Evaluated:
+        """What a function of the five vectors leaves."""
+
+        def run() -> Evaluated:
+            s, x = Vector(self.structure), Vector(list(self.numbers))
+            w, y = Vector([0.0] * self.structure[MODEL.WORK_SIZE]), Vector(list(self._y))
+            f = Vector([0.0] * len(self._y))
+            w[WORK.TIME] = self._t
+            for k, control in enumerate(self._controls):
+                w[self.structure[MODEL.WORK_CONTROL] + k] = control
+            result = law(s, x, w, y, f)
+            return Evaluated(s, x, w, f, result, ways.run.failures)
+
+        try:
+            return ways.repeated(run)
+        except ways.NoFormula as error:
+            named = next((self._path(item) for item in error.items if item in self._packed.owners), "")
+            whose = f"'{named}'" if named else "the model"
+            raise UnsupportedError(
+                f"{whose} has no formula for CasADi: {error}; set its appliesForce to false, or take another class"
+            ) from error
+
+
+class Evaluated:
+    """What an evaluation has left.
+
+    Args:
+        s: the structure.
+        x: the numbers.
+        w: the work vector.
+        f: derivative of the state, or what stands in its place.
+        result: what the function returned.
+        failures: where one of these holds, there is no result.
+    """
+
+    def __init__(self, s: Vector, x: Vector, w: Vector, f: Vector, result: Any, failures: Sequence[Any]) -> None:
+        self.s, self.x, self.w, self.f, self.result = s, x, w, f, result
+        self._failed = reduce(casadi.logic_or, failures) if failures else None
+
+    def sure(self, numbers: Sequence[Any]) -> Any:
+        """Numbers as one column, which are none where the evaluation fails."""
+        column = casadi.SX(casadi.vertcat(*numbers))
+        return column if self._failed is None else casadi.if_else(self._failed, casadi.DM.nan(column.shape), column)

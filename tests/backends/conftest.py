@@ -1,0 +1,5 @@
+"""The browser that runs JavaScript."""
+
+from __future__ import annotations
+
+from tests.browser import chromium as chromium
