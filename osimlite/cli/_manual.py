@@ -11,6 +11,7 @@ PAGES = {
     "osimlite.errors.MissingFolderError": "docs/errors.md#folders",
     "osimlite.errors.NotWellFormedError": "docs/rules.md#text",
     "osimlite.errors.VersionError": "docs/errors.md#versions",
+    "osimlite.backends": "docs/casadi.md",
     "osimlite.cli._validating": "docs/lint-in-ci.md",
     "osimlite.cli.build": "docs/errors.md#sources-of-models",
     "osimlite.cli.check_trial": "docs/checking-trials.md",

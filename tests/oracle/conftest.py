@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -11,6 +12,7 @@ from typing import Any
 
 import pytest
 
+_environment = dict(os.environ)
 try:
     import opensim
 except ImportError:
@@ -19,6 +21,9 @@ else:
     _names = opensim.ArrayStr()
     opensim.OpenSimObject.getRegisteredTypenames(_names)
     PRISTINE = [opensim.OpenSimObject.newInstanceOfType(_names.get(k)) for k in range(_names.getSize())]
+    # It puts its folder into the paths of libraries and programs, and with these its CasADi into processes to come.
+    os.environ.clear()
+    os.environ.update(_environment)
 """One object of each class, as OpenSim makes it before it has read any file: made while tests are collected."""
 
 
