@@ -12,7 +12,13 @@ from math import inf
 from typing import NamedTuple
 
 from osimlite.forces.bezier import LAST, curve_integral, curve_value
-from osimlite.forces.muscles import SIGNIFICANT, cos_pennation, fiber_length_along, first_order_activation_rate
+from osimlite.forces.muscles import (
+    SIGNIFICANT,
+    MuscleInputs,
+    cos_pennation,
+    fiber_length_along,
+    first_order_activation_rate,
+)
 
 ROUNDS, STEP = 500, 0.75
 """Steps in the search for an equilibrium, each of this part of Newton's."""
@@ -59,6 +65,26 @@ class Millard2012Acceleration(NamedTuple):
     optimal_cos: float
 
 
+class AccelerationCurves(NamedTuple):
+    """The curves of a muscle, as `curve_value` takes them.
+
+    Attributes:
+        active: active force over fiber length.
+        velocity: factor of the active force over fiber velocity.
+        passive: passive force over fiber length.
+        tendon: force over tendon length.
+        short: force against short fibers over their length.
+        steep: force against steep fibers over the cosine of pennation.
+    """
+
+    active: Sequence[float]
+    velocity: Sequence[float]
+    passive: Sequence[float]
+    tendon: Sequence[float]
+    short: Sequence[float]
+    steep: Sequence[float]
+
+
 class Moment(NamedTuple):
     """What fibers, tendon and the mass between them do.
 
@@ -92,12 +118,7 @@ def moment(
     velocity: float,
     tendon: float,
     rate: float,
-    active_curve: Sequence[float],
-    velocity_curve: Sequence[float],
-    passive_curve: Sequence[float],
-    tendon_curve: Sequence[float],
-    short_curve: Sequence[float],
-    steep_curve: Sequence[float],
+    curves: AccelerationCurves,
 ) -> Moment:
     """What there is at a fiber length; see calcAccelerationMuscleInfo and calcMuscleDynamicsInfo of OpenSim's class.
 
@@ -108,12 +129,7 @@ def moment(
         velocity: of it, m/s.
         tendon: length of the tendon, m.
         rate: of it, m/s.
-        active_curve: active force over fiber length.
-        velocity_curve: factor of the active force over fiber velocity.
-        passive_curve: passive force over fiber length.
-        tendon_curve: force over tendon length.
-        short_curve: force against short fibers over their length.
-        steep_curve: force against steep fibers over the cosine of pennation.
+        curves: of the muscle.
     """
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
     sin = m.height / fiber
@@ -122,17 +138,17 @@ def moment(
     along = velocity * cos - fiber * sin * turning
     turning_slope = velocity / (fiber * fiber) * tan - velocity / fiber * (1.0 + tan * tan) * turn
     along_slope = -velocity * sin * turn - sin * turning - fiber * cos * turn * turning - fiber * sin * turning_slope
-    by_length, active_slope = curve_value(active_curve, fiber / m.optimal)
-    by_velocity, _ = curve_value(velocity_curve, velocity / (m.fastest * m.optimal))
+    by_length, active_slope = curve_value(curves.active, fiber / m.optimal)
+    by_velocity, _ = curve_value(curves.velocity, velocity / (m.fastest * m.optimal))
 
-    pull, pull_slope = curve_value(tendon_curve, tendon / m.slack)
+    pull, pull_slope = curve_value(curves.tendon, tendon / m.slack)
     damped = max(1.0 + m.tendon_damping * rate / m.slack, 0.0)
     tension, tendon_stiffness = m.strength * pull * damped, m.strength * pull_slope / m.slack * damped
-    stretch, stretch_slope = curve_value(passive_curve, fiber / m.optimal)
-    short, short_slope = curve_value(short_curve, fiber / m.optimal)
+    stretch, stretch_slope = curve_value(curves.passive, fiber / m.optimal)
+    short, short_slope = curve_value(curves.short, fiber / m.optimal)
     stretched = max(1.0 + m.passive_damping * velocity / m.optimal, 0.0)
     shortened = max(1.0 - m.short_damping * velocity / m.optimal, 0.0)
-    steep, steep_slope = curve_value(steep_curve, cos)
+    steep, steep_slope = curve_value(curves.steep, cos)
     normal = m.steep_damping / (m.optimal * m.optimal_cos)
     steepened = max(1.0 - normal * along, 0.0)
     steep_slope = -steep_slope * sin * turn * steepened - (steep * normal * along_slope if steepened > 0.0 else 0.0)
@@ -152,57 +168,24 @@ def moment(
 
 
 def millard2012_acceleration(
-    length: float,
-    rate: float,
-    excitation: float,
-    activation: float,
-    fiber_length: float,
-    fiber_velocity: float,
-    m: Millard2012Acceleration,
-    active_curve: Sequence[float],
-    velocity_curve: Sequence[float],
-    passive_curve: Sequence[float],
-    tendon_curve: Sequence[float],
-    short_curve: Sequence[float],
-    steep_curve: Sequence[float],
+    now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
     """The muscle at a moment. The activation is bounded in its rate only, and fibers may be of any length.
-
-    Args:
-        length: of the path, m.
-        rate: of it, m/s.
-        excitation: the control.
-        activation: state.
-        fiber_length: state, m.
-        fiber_velocity: state, m/s.
-        m: the muscle.
-        active_curve: as of `moment`, with the five that follow.
 
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by length and by
         velocity, active and passive fiber force (N), whether the fibers are longer than the muscle is wide, rate of
         activation (1/s), fiber velocity (m/s) and its rate (m/s^2).
     """
+    fiber_length, velocity = now.fiber_length, now.fiber_velocity
     cos = cos_pennation(fiber_length, m.height, m.shortest, m.largest_sin, m.least_cos)
-    at = moment(
-        m,
-        activation,
-        fiber_length,
-        fiber_velocity,
-        length - fiber_length * cos,
-        rate - fiber_velocity / cos,
-        active_curve,
-        velocity_curve,
-        passive_curve,
-        tendon_curve,
-        short_curve,
-        steep_curve,
-    )
-    pull = activation * at.by_length * at.by_velocity * m.strength
-    change = first_order_activation_rate(excitation, activation, m.rising, m.falling, m.least)
+    tendon, rate = now.length - fiber_length * cos, now.rate - velocity / cos
+    at = moment(m, now.activation, fiber_length, velocity, tendon, rate, curves)
+    pull = now.activation * at.by_length * at.by_velocity * m.strength
+    change = first_order_activation_rate(now.excitation, now.activation, m.rising, m.falling, m.least)
     return (
         at.tension,
-        activation,
+        now.activation,
         fiber_length,
         at.cos,
         at.by_length,
@@ -211,62 +194,32 @@ def millard2012_acceleration(
         at.passive,
         fiber_length > m.height,
         change,
-        fiber_velocity,
+        velocity,
         at.acceleration,
     )
 
 
-def millard2012_acceleration_rigid(
-    length: float,
-    rate: float,
-    excitation: float,
-    activation: float,
-    fiber_length: float,
-    fiber_velocity: float,
-    m: Millard2012Acceleration,
-    active_curve: Sequence[float],
-    velocity_curve: Sequence[float],
-    passive_curve: Sequence[float],
-    tendon_curve: Sequence[float],
-    short_curve: Sequence[float],
-    steep_curve: Sequence[float],
-) -> float:
-    """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim.
-
-    Args as of `millard2012_acceleration`; the states do not count.
-    """
-    fiber = fiber_length_along(length - m.slack, m.height, m.shortest, m.least_cos)
+def millard2012_acceleration_rigid(now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves) -> float:
+    """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim."""
+    fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
     if not fiber > m.shortest:
         return 0.0
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
-    by_length, _ = curve_value(active_curve, fiber / m.optimal)
-    by_velocity, _ = curve_value(velocity_curve, rate * cos / (m.optimal * m.fastest))
+    by_length, _ = curve_value(curves.active, fiber / m.optimal)
+    by_velocity, _ = curve_value(curves.velocity, now.rate * cos / (m.optimal * m.fastest))
     return m.strength * by_length * by_velocity * cos
 
 
 def millard2012_acceleration_equilibrium(
-    length: float,
-    rate: float,
-    excitation: float,
-    activation: float,
-    fiber_length: float,
-    fiber_velocity: float,
-    m: Millard2012Acceleration,
-    active_curve: Sequence[float],
-    velocity_curve: Sequence[float],
-    passive_curve: Sequence[float],
-    tendon_curve: Sequence[float],
-    short_curve: Sequence[float],
-    steep_curve: Sequence[float],
+    now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
 ) -> tuple[bool, float, float]:
     """Whether there is a fiber length that is not accelerated, that length (m), and its velocity (m/s).
 
     Step for step as in initMuscleState of OpenSim's class: parts of Newton's steps, while the rate of the path is
     shared between fibers and tendon by their stiffness. Where the slope vanishes, OpenSim goes on somewhere at random;
     here the search ends. It ends, as there, where a tendon without stiffness becomes taut.
-
-    Args as of `millard2012_acceleration`.
     """
+    length, rate = now.length, now.rate
     tolerance, tendon, tendon_rate = max(1e-8 * m.strength, 10.0 * SIGNIFICANT), 1.01 * m.slack, 0.0
     fiber = fiber_length_along(length - tendon, m.height, m.shortest, m.least_cos)
     for _ in range(ROUNDS):
@@ -274,20 +227,7 @@ def millard2012_acceleration_equilibrium(
             break
         cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
         velocity = (rate - tendon_rate) * cos
-        at = moment(
-            m,
-            activation,
-            fiber,
-            velocity,
-            tendon,
-            tendon_rate,
-            active_curve,
-            velocity_curve,
-            passive_curve,
-            tendon_curve,
-            short_curve,
-            steep_curve,
-        )
+        at = moment(m, now.activation, fiber, velocity, tendon, tendon_rate, curves)
         if abs(at.acceleration) <= tolerance:
             return True, fiber, velocity
         if not SIGNIFICANT < abs(at.slope) < inf:
@@ -299,18 +239,11 @@ def millard2012_acceleration_equilibrium(
             if at.tendon_stiffness == 0.0:
                 break
             tendon_rate = at.stiffness / both * rate
-    return False, fiber, fiber_velocity
+    return False, fiber, now.fiber_velocity
 
 
 def millard2012_acceleration_energy(
-    m: Millard2012Acceleration,
-    length: float,
-    fiber_length: float,
-    cos: float,
-    passive_curve: Sequence[float],
-    tendon_curve: Sequence[float],
-    short_curve: Sequence[float],
-    steep_curve: Sequence[float],
+    m: Millard2012Acceleration, length: float, fiber_length: float, cos: float, curves: AccelerationCurves
 ) -> float:
     """Potential energy, J; the energy of the mass is not counted.
 
@@ -319,11 +252,12 @@ def millard2012_acceleration_energy(
         length: of the path, m.
         fiber_length: m.
         cos: of pennation.
-        passive_curve: as of `moment`, with the three that follow.
+        curves: of the muscle.
     """
-    stretched = curve_integral(passive_curve, fiber_length / m.optimal)
-    shortened = curve_integral(short_curve, short_curve[LAST]) - curve_integral(short_curve, fiber_length / m.optimal)
-    pulled = curve_integral(tendon_curve, (length - fiber_length * cos) / m.slack)
-    steepened = curve_integral(steep_curve, steep_curve[LAST]) - curve_integral(steep_curve, cos)
+    short, steep = curves.short, curves.steep
+    stretched = curve_integral(curves.passive, fiber_length / m.optimal)
+    shortened = curve_integral(short, short[LAST]) - curve_integral(short, fiber_length / m.optimal)
+    pulled = curve_integral(curves.tendon, (length - fiber_length * cos) / m.slack)
+    steepened = curve_integral(steep, steep[LAST]) - curve_integral(steep, cos)
     # As in OpenSim, the last has no length by which it would be an energy.
     return m.strength * (m.optimal * (stretched + shortened) + m.slack * pulled + steepened)

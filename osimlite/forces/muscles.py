@@ -8,11 +8,34 @@ constant. OpenSim's MuscleFixedWidthPennationModel bounds the angle, and so the 
 from __future__ import annotations
 
 from math import cos, sin, sqrt
+from typing import NamedTuple
 
 SIGNIFICANT = 2.0 ** (-52.0 * 7.0 / 8.0)
 """Simbody's SignificantReal."""
 NO_ANGLE = 2.0**-52
 """Fibers at a smaller angle are as straight as the tendon."""
+
+
+class MuscleInputs(NamedTuple):
+    """What the law of a muscle is given of a moment; a state that the muscle has not is 0.
+
+    Attributes:
+        length: of the path, m.
+        rate: of it, m/s.
+        excitation: the control.
+        activation: state.
+        fiber_length: state, m.
+        fiber_velocity: state, m/s.
+        normalized_tendon_force: state.
+    """
+
+    length: float
+    rate: float
+    excitation: float
+    activation: float = 0.0
+    fiber_length: float = 0.0
+    fiber_velocity: float = 0.0
+    normalized_tendon_force: float = 0.0
 
 
 def first_order_activation_rate(

@@ -13,6 +13,8 @@ from __future__ import annotations
 from math import atan, copysign, exp, inf, log, nan, sinh, sqrt, tanh
 from typing import NamedTuple
 
+from osimlite.forces.muscles import MuscleInputs
+
 SHORTEST, PASSIVE_SHAPE = 0.2, 4.0
 """Fiber length where De Groote's passive force is 0, and its exponent at full strain."""
 BELOW = 0.2
@@ -136,36 +138,22 @@ def smooth_tendon_length(force: float, growth: float) -> float:
 
 
 def degroote(
-    length: float,
-    rate: float,
-    excitation: float,
-    activation: float,
-    normalized_tendon_force: float,
-    m: SmoothMuscle,
-    tendon: SmoothTendon,
+    now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon
 ) -> tuple[float, float, float, float, float, float, float, float, float, float, float, float, float]:
     """De Groote's muscle at a moment; see DeGrooteFregly2016Muscle of OpenSim.
 
     As in OpenSim, damping of the fibers is not in the rate of the tendon's force: with an elastic tendon it changes
     only what is reported of the fibers.
 
-    Args:
-        length: of the path, m.
-        rate: of it, m/s.
-        excitation: the control.
-        activation: state.
-        normalized_tendon_force: state.
-        m: the muscle.
-        tendon: of it.
-
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by length and by
         velocity, active and passive fiber force (N), rates of activation and of the normalized tendon force (1/s),
         fiber velocity (m/s), what of the passive force is not by damping (N), energy (J).
     """
-    a = activation if m.follows else excitation
-    tendon_length = smooth_tendon_length(normalized_tendon_force, tendon.growth) if tendon.elastic else 1.0
-    along = length - m.slack * tendon_length
+    a = now.activation if m.follows else now.excitation
+    force = now.normalized_tendon_force
+    tendon_length = smooth_tendon_length(force, tendon.growth) if tendon.elastic else 1.0
+    along = now.length - m.slack * tendon_length
     fiber_length = sqrt(along * along + m.height * m.height)
     cos = along / fiber_length
     active = degroote_active(fiber_length / m.optimal, m.scale)
@@ -173,74 +161,52 @@ def degroote(
     energy *= m.strength * m.optimal
     fastest, force_rate = m.fastest * m.optimal, 0.0
     if tendon.elastic and tendon.explicit:
-        factor = (normalized_tendon_force / cos - passive) / (a * active)
+        factor = (force / cos - passive) / (a * active)
         velocity = degroote_velocity(factor)
-        slope = tendon.growth * (normalized_tendon_force + BELOW)
-        force_rate = (rate - velocity * fastest / cos) / m.slack * slope
+        slope = tendon.growth * (force + BELOW)
+        force_rate = (now.rate - velocity * fastest / cos) / m.slack * slope
     else:
-        velocity = rate * cos / fastest
+        velocity = now.rate * cos / fastest
         factor = degroote_factor(velocity)
     active_force = m.strength * a * active * factor
     spring = m.strength * passive
     passive_force = m.strength * (passive + m.damping * velocity)
     tension = (active_force + passive_force) * cos
     if tendon.elastic:
-        tension = m.strength * normalized_tendon_force
-        energy += m.strength * m.slack * (normalized_tendon_force / tendon.growth - BELOW * (tendon_length - 1.0))
-    activation_rate = smooth_activation_rate(excitation, a, m.rising, m.falling, m.sharpness)
+        tension = m.strength * force
+        energy += m.strength * m.slack * (force / tendon.growth - BELOW * (tendon_length - 1.0))
+    activation_rate = smooth_activation_rate(now.excitation, a, m.rising, m.falling, m.sharpness)
     fibers = fiber_length, cos, active, factor, active_force, passive_force
     return tension, a, *fibers, activation_rate, force_rate, velocity * fastest, spring, energy
 
 
-def degroote_rigid(
-    length: float,
-    rate: float,
-    excitation: float,
-    activation: float,
-    normalized_tendon_force: float,
-    m: SmoothMuscle,
-    tendon: SmoothTendon,
-) -> float:
-    """Force (N) of fully active fibers with a rigid tendon, along the fibers as OpenSim has it.
-
-    Args as of `degroote`; the states do not count.
-    """
-    fiber_length, velocity = rigid_fibers(length, rate, m)
+def degroote_rigid(now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon) -> float:
+    """Force (N) of fully active fibers with a rigid tendon, along the fibers as OpenSim has it."""
+    fiber_length, velocity = rigid_fibers(now, m)
     return m.strength * degroote_active(fiber_length, m.scale) * degroote_factor(velocity)
 
 
-def rigid_fibers(length: float, rate: float, m: SmoothMuscle) -> tuple[float, float]:
+def rigid_fibers(now: MuscleInputs, m: SmoothMuscle) -> tuple[float, float]:
     """Normalized length and velocity of fibers whose tendon keeps its slack length."""
-    along = length - m.slack
+    along = now.length - m.slack
     fiber_length = sqrt(along * along + m.height * m.height)
-    return fiber_length / m.optimal, rate * (along / fiber_length) / (m.fastest * m.optimal)
+    return fiber_length / m.optimal, now.rate * (along / fiber_length) / (m.fastest * m.optimal)
 
 
-def degroote_equilibrium(
-    length: float,
-    rate: float,
-    excitation: float,
-    activation: float,
-    normalized_tendon_force: float,
-    m: SmoothMuscle,
-    tendon: SmoothTendon,
-) -> tuple[bool, float]:
+def degroote_equilibrium(now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon) -> tuple[bool, float]:
     """Whether there is a tendon force that the fibers bear while it does not change, and that force.
 
     The interval from 0 to 5 is halved, step for step as in OpenSim's solveBisection.
-
-    Args as of `degroote`.
     """
-    a = activation if m.follows else excitation
     low, high = 0.0, LARGEST_FORCE
-    at_low = degroote_residual(low, length, rate, a, m, tendon)
-    result = at_low * degroote_residual(high, length, rate, a, m, tendon) < 0.0
+    at_low = degroote_residual(low, now, m, tendon)
+    result = at_low * degroote_residual(high, now, m, tendon) < 0.0
     middle = low
     for _ in range(ROUNDS):
         if high - low <= CLOSE:
             break
         middle = 0.5 * (low + high)
-        residual = degroote_residual(middle, length, rate, a, m, tendon)
+        residual = degroote_residual(middle, now, m, tendon)
         if residual * at_low < 0.0:
             high = middle
         else:
@@ -248,12 +214,11 @@ def degroote_equilibrium(
     return result, middle
 
 
-def degroote_residual(
-    force: float, length: float, rate: float, activation: float, m: SmoothMuscle, tendon: SmoothTendon
-) -> float:
+def degroote_residual(force: float, now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon) -> float:
     """By how much the tendon's force exceeds what the fibers bear along it, if it does not change."""
     still = SmoothTendon(tendon.passive_strain, tendon.growth, tendon.elastic, 0.0)
-    result = degroote(length, rate, activation, activation, force, m, still)
+    pulled = MuscleInputs(now.length, now.rate, now.excitation, now.activation, 0.0, 0.0, force)
+    result = degroote(pulled, m, still)
     return force - (result[6] + result[7]) / m.strength * result[3]
 
 
@@ -280,26 +245,26 @@ def meyer_factor(velocity: float) -> float:
 
 
 def meyer(
-    length: float, rate: float, excitation: float, activation: float, m: SmoothMuscle
+    now: MuscleInputs, m: SmoothMuscle
 ) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
     """Meyer's muscle, whose tendon is rigid, at a moment; as `degroote`. OpenSim knows of no energy that it stores."""
-    a = activation if m.follows else excitation
-    along = length - m.slack
+    a = now.activation if m.follows else now.excitation
+    along = now.length - m.slack
     fiber_length = sqrt(along * along + m.height * m.height)
     cos = along / fiber_length
     active = meyer_active(fiber_length / m.optimal, m.scale)
     passive = meyer_passive(fiber_length / m.optimal) if m.passive else 0.0
-    velocity = rate * cos / (m.fastest * m.optimal)
+    velocity = now.rate * cos / (m.fastest * m.optimal)
     factor = meyer_factor(velocity)
     active_force = m.strength * a * active * factor
     passive_force = m.strength * (passive + m.damping * velocity)
     tension = (active_force + passive_force) * cos
-    activation_rate = smooth_activation_rate(excitation, a, m.rising, m.falling, m.sharpness)
+    activation_rate = smooth_activation_rate(now.excitation, a, m.rising, m.falling, m.sharpness)
     fibers = fiber_length, cos, active, factor, active_force, passive_force
-    return tension, a, *fibers, activation_rate, rate * cos, m.strength * passive
+    return tension, a, *fibers, activation_rate, now.rate * cos, m.strength * passive
 
 
-def meyer_rigid(length: float, rate: float, excitation: float, activation: float, m: SmoothMuscle) -> float:
+def meyer_rigid(now: MuscleInputs, m: SmoothMuscle) -> float:
     """Force (N) of fully active fibers; as `degroote_rigid`."""
-    fiber_length, velocity = rigid_fibers(length, rate, m)
+    fiber_length, velocity = rigid_fibers(now, m)
     return m.strength * meyer_active(fiber_length, m.scale) * meyer_factor(velocity)

@@ -9,7 +9,13 @@ from __future__ import annotations
 from math import exp, isnan, nan, sqrt
 from typing import NamedTuple
 
-from osimlite.forces.muscles import SIGNIFICANT, cos_pennation, fiber_length_along, first_order_activation_rate
+from osimlite.forces.muscles import (
+    SIGNIFICANT,
+    MuscleInputs,
+    cos_pennation,
+    fiber_length_along,
+    first_order_activation_rate,
+)
 
 TOE_SHAPE, TOE_FORCE = 3.0, 0.33
 """Of the tendon: the exponent at the end of its toe, and the force there."""
@@ -200,30 +206,22 @@ def tolerance(m: Thelen2003) -> float:
 
 
 def thelen2003(
-    length: float, rate: float, excitation: float, activation: float, fiber_length: float, m: Thelen2003
+    now: MuscleInputs, m: Thelen2003
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
     """The muscle at a moment; see Thelen2003Muscle::calcFiberVelocityInfo and calcMuscleDynamicsInfo of OpenSim.
 
     Fibers at their least length stay there as long as they would shorten, and bear nothing then but what is passive.
 
-    Args:
-        length: of the path, m.
-        rate: of it, m/s.
-        excitation: the control.
-        activation: state.
-        fiber_length: state, m.
-        m: the muscle.
-
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by length and by
         velocity, active and passive fiber force (N), rate of activation (1/s), fiber velocity (m/s).
     """
-    active = min(max(activation, m.least), 1.0)
-    fibers = fibers_at(m, length, max(fiber_length, m.shortest))
+    active = min(max(now.activation, m.least), 1.0)
+    fibers = fibers_at(m, now.length, max(now.fiber_length, m.shortest))
     isometric, borne = active * fibers.active, fibers.tendon / fibers.cos - fibers.passive
     velocity, _ = fiber_velocity(m, borne, active, isometric)
     by_velocity = borne / isometric
-    if fiber_length <= m.shortest and velocity <= 0.0:
+    if now.fiber_length <= m.shortest and velocity <= 0.0:
         velocity, by_velocity, borne = 0.0, 1.0, 0.0
     return (
         fibers.tendon * m.strength,
@@ -234,24 +232,19 @@ def thelen2003(
         by_velocity,
         borne * m.strength,
         fibers.passive * m.strength,
-        first_order_activation_rate(excitation, activation, m.rising, m.falling, m.least),
+        first_order_activation_rate(now.excitation, now.activation, m.rising, m.falling, m.least),
         velocity * m.fastest * m.optimal,
     )
 
 
-def thelen2003_rigid(
-    length: float, rate: float, excitation: float, activation: float, fiber_length: float, m: Thelen2003
-) -> float:
-    """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim.
-
-    Args as of `thelen2003`; the states do not count.
-    """
-    fiber = fiber_length_along(length - m.slack, m.height, m.shortest, m.least_cos)
+def thelen2003_rigid(now: MuscleInputs, m: Thelen2003) -> float:
+    """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim."""
+    fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
     if not fiber > m.shortest:
         return 0.0
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
     isometric, _ = active_force(fiber / m.optimal, m.width)
-    factor = force_at_velocity(m, rate * cos / (m.optimal * m.fastest), 1.0, isometric, ENOUGH)
+    factor = force_at_velocity(m, now.rate * cos / (m.optimal * m.fastest), 1.0, isometric, ENOUGH)
     return m.strength * isometric * factor * cos
 
 
@@ -271,21 +264,17 @@ def thelen2003_energy(m: Thelen2003, length: float, fiber_length: float, cos: fl
     return m.strength * (tendon + m.optimal * passive_energy(fiber_length, m.passive_growth, m.passive_factor))
 
 
-def thelen2003_equilibrium(
-    length: float, rate: float, excitation: float, activation: float, fiber_length: float, m: Thelen2003
-) -> tuple[bool, float]:
+def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, float]:
     """Whether there is a fiber length at which fibers and tendon bear the same, and that length (m).
 
     Newton's method with halved steps, step for step as in Thelen2003Muscle::initMuscleState: the rate of the path is
     shared between fibers and tendon by their stiffness, so that a muscle whose path moves does not start at rest. A
     length that would be below the least is that.
-
-    Args as of `thelen2003`.
     """
-    active = min(max(activation, m.least), 1.0)
+    length, active = now.length, min(max(now.activation, m.least), 1.0)
     fibers = fibers_at(m, length, fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos))
     stiffness, _ = stiffnesses(m, fibers, active, 0.0)
-    by_velocity = shared(m, fibers, active, rate, stiffness)
+    by_velocity = shared(m, fibers, active, now.rate, stiffness)
     borne, error = balance(m, fibers, active * by_velocity)
     stiffness, of_tendon = stiffnesses(m, fibers, active * by_velocity, borne)
     for _ in range(ROUNDS):
@@ -303,7 +292,7 @@ def thelen2003_equilibrium(
                 break
             part *= 0.5
         stiffness, of_tendon = stiffnesses(m, fibers, active * by_velocity, borne)
-        by_velocity = shared(m, fibers, active, rate, stiffness)
+        by_velocity = shared(m, fibers, active, now.rate, stiffness)
     if isnan(by_velocity):
         return False, fibers.length
     return abs(error) < tolerance(m) or fibers.length <= m.shortest, fibers.length

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from osimlite.errors import ModelError
+from osimlite.forces.muscles import MuscleInputs
 from osimlite.lint.measures import Pose, Reach, Start
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
@@ -17,7 +18,7 @@ from osimlite.schema.muscles import Muscle
 from osimlite.schema.states import states_of
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kind import Kind, kind_of_class
-from osimlite.simulation.elements.parameters import Fields, Number, Numbers
+from osimlite.simulation.elements.parameters import Fields, Number, Numbers, Together
 
 ROUNDING = 1e-9
 REST = 0.01
@@ -64,9 +65,10 @@ class Fibers(NamedTuple):
 
     def _asked(self, law: Callable[..., Any] | None, length: float, states: dict[str, float]) -> Sequence[Any]:
         assert law is not None
-        given = [states[state.name] for state in self.kind.states if state.given]
         try:
-            result: Sequence[Any] = law(length, 0.0, states.get("activation", 1.0), *given, *self.values)
+            result: Sequence[Any] = law(
+                MuscleInputs(length, 0.0, states.get("activation", 1.0), **states), *self.values
+            )
         except (ArithmeticError, ValueError):
             # Machine code has no number there.
             return [nan] * len(self.kind.outputs)
@@ -87,7 +89,8 @@ def fibers_of(model: Model, mechanism: Mechanism, wanted: Container[str]) -> Ite
         if kind is None or not muscle.appliesForce or builder.path(muscle) not in wanted:
             continue
         _, *terms = kind.terms
-        if not all(isinstance(term, Fields | Number | Numbers) for term in terms):
+        parts = (part for term in terms for part in (term.terms if isinstance(term, Together) else (term,)))
+        if not all(isinstance(part, Fields | Number | Numbers) for part in parts):
             continue
         # What OpenSim refuses, other rules have told.
         with suppress(ModelError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated
 
+from osimlite.forces.muscles import MuscleInputs
 from osimlite.schema.facts import NAN, Contradiction, Facts
 from osimlite.schema.fields import real
 from osimlite.schema.muscles import Muscle
@@ -44,10 +45,7 @@ class StraightMuscle(Muscle):
 
 
 def straight(
-    length: float,
-    rate: float,
-    excitation: float,
-    activation: float,
+    now: MuscleInputs,
     strength: float,
     optimal: float,
     slack: float,
@@ -57,11 +55,12 @@ def straight(
     rise: float,
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
     """Tension (N), what else is recorded of muscles, rate of the activation (1/s), fiber velocity (m/s)."""
-    fibers = length - slack
+    fibers = now.length - slack
     active = max(1.0 - abs(fibers / optimal - 1.0) / width, 0.0)
-    factor = min(max(1.0 + rate / (optimal * fastest), 0.0), grip)
-    force = strength * activation * active * factor
-    return force, activation, fibers, 1.0, active, factor, force, 0.0, (excitation - activation) / rise, rate
+    factor = min(max(1.0 + now.rate / (optimal * fastest), 0.0), grip)
+    force = strength * now.activation * active * factor
+    change = (now.excitation - now.activation) / rise
+    return force, now.activation, fibers, 1.0, active, factor, force, 0.0, change, now.rate
 
 
 KIND = muscle(

@@ -15,6 +15,7 @@ from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF, RESPONSE, RIGID
 
 if TYPE_CHECKING:
     from osimlite.simulation.elements.kind import Kind, State
+    from osimlite.simulation.elements.parameters import Parameter
 
 SOLVED = "solved"
 """The output that tells whether the law has a solution; without it, it always has one."""
@@ -50,7 +51,7 @@ class KernelText:
     def equilibrium_kernel(self) -> Callable[..., int]:
         """The function that brings the states of one force into equilibrium."""
         kind = self.kind
-        lines = [f"{', '.join((SOLVED, *kind.settled))} = law({', '.join(self._arguments)})"]
+        lines = [f"{', '.join((SOLVED, *kind.settled))} = {self._call(self._arguments)}"]
         lines += self._noted((*kind.geometry.inputs, *kind.settled))
         lines += [f"if not {SOLVED}:", "    return OUTCOME.UNSOLVED"]
         for place, state in self._places.items():
@@ -61,7 +62,7 @@ class KernelText:
     @cached_property
     def rigid_kernel(self) -> Callable[..., int]:
         """The function of a muscle that pulls with its control times the force of fully active fibers."""
-        lines = [f"active_fiber_force = law({', '.join(self._arguments)})"]
+        lines = [f"active_fiber_force = {self._call(self._arguments)}"]
         lines += [f"activation = {self._arguments[len(self.kind.geometry.inputs)]}"]
         lines += ["tension = activation * active_fiber_force"]
         lines += self._noted(("tension", "activation", "active_fiber_force", *self.kind.geometry.inputs))
@@ -76,13 +77,13 @@ class KernelText:
         kind, outputs = self.kind, self.kind.outputs
         force, _ = kind.geometry.along
         # A rate may have the name of an output of another meaning, such as that of a state.
-        lines = [f"{', '.join(f'{name}_0' for name in outputs)} = law({', '.join(self._arguments)})"]
+        lines = [f"{', '.join(f'{name}_0' for name in outputs)} = {self._call(self._arguments)}"]
         changed = self._changed
         for column, place in changed.items():
             arguments = self._arguments
             arguments[place] += f" + {SMALL_CHANGE}"
             results = ", ".join(f"{name}_{column + 1}" for name in outputs)
-            lines.append(f"{results} = law({', '.join(arguments)})")
+            lines.append(f"{results} = {self._call(arguments)}")
         lines += [f"{force} = 1.0", *kind.geometry.after, "change = at(w, WORK.SCRATCH)"]
         for row, name in enumerate((force, *(state.rate for state in kind.states))):
             for column in range(WIDTH):
@@ -94,7 +95,7 @@ class KernelText:
     def _changed(self) -> dict[int, int]:
         """By column of the derivatives the place of the argument that is changed."""
         kind = self.kind
-        inputs = list(kind.geometry.inputs if kind.inputs is None else kind.inputs)
+        inputs = list(self._inputs)
         result = {column: inputs.index(name) for column, name in enumerate(kind.geometry.inputs) if name in inputs}
         given = [column for column, state in enumerate(kind.states) if state.given]
         first = len(inputs) + kind.controlled
@@ -121,6 +122,8 @@ class KernelText:
             ]
         )
         scope = {name: value for term in kind.terms for name, value in term.functions().items()}
+        if kind.together is not None:
+            scope[kind.together.__name__] = kind.together
         return written(name, f"{__package__}.kinds.{kind.name}", source, law=law, **kind.geometry.functions(), **scope)
 
     @property
@@ -129,7 +132,7 @@ class KernelText:
         kind, lines = self.kind, []
         if kind.law is not None:
             results = f"{', '.join(kind.outputs)} = " if kind.outputs else ""
-            lines.append(f"{results}law({', '.join(self._arguments)})")
+            lines.append(f"{results}{self._call(self._arguments)}")
         lines += self._noted(kind.recorded)
         if SOLVED in kind.outputs:
             lines += [f"if not {SOLVED}:", "    return OUTCOME.UNSOLVED"]
@@ -151,16 +154,25 @@ class KernelText:
     def _arguments(self) -> list[str]:
         """What a law is called with."""
         kind = self.kind
-        places, number = ITEM.OWN, 0
-        terms: list[str] = []
-        for term in kind.terms:
-            terms += term.arguments(places, number)
-            places, number = places + term.heads, number + term.size
+        terms = arguments_of(kind.terms, ITEM.OWN, 0)
         given = [place for place, state in self._places.items() if state.given]
         states = [f"(y[i[{place}]] if i[{place}] >= 0 else 0.0)" for place in given]
         count = 1 if kind.controlled else 0
-        inputs = kind.geometry.inputs if kind.inputs is None else kind.inputs
-        return [*inputs, *terms[:count], *states, *terms[count:]]
+        return [*self._inputs, *terms[:count], *states, *terms[count:]]
+
+    @property
+    def _inputs(self) -> tuple[str, ...]:
+        return self.kind.geometry.inputs if self.kind.inputs is None else self.kind.inputs
+
+    def _call(self, arguments: Sequence[str]) -> str:
+        """The law called with these; as one, those that change with time, if the kind says so."""
+        made = self.kind.together
+        if made is None:
+            return f"law({', '.join(arguments)})"
+        names = *self._inputs, "excitation", *(state.name for state in self.kind.states if state.given)
+        given = dict(zip(names, arguments, strict=False))
+        first = f"{made.__name__}({', '.join(given.get(name, '0.0') for name in made._fields)})"
+        return f"law({', '.join((first, *arguments[len(names) :]))})"
 
     @property
     def heads(self) -> int:
@@ -171,6 +183,15 @@ class KernelText:
     def size(self) -> int:
         """How many numbers of an item are the parameters."""
         return sum(term.size for term in self.kind.terms)
+
+
+def arguments_of(terms: Iterable[Parameter], head: int, number: int) -> list[str]:
+    """What a law is called with for terms whose integers and numbers begin at these places."""
+    result = []
+    for term in terms:
+        result += term.arguments(head, number)
+        head, number = head + term.heads, number + term.size
+    return result
 
 
 def written(name: str, module: str, source: str, **scope: Any) -> Callable[..., int]:

@@ -82,6 +82,7 @@ class Kind:
         kept: which of them, and of the derivatives of states, are recorded too.
         controlled: whether the law is given the control, or the controls if there are several.
         states: of each force.
+        together: named tuple as which the law is given inputs, excitation and states; one by one if None.
         equilibrium: computes states in equilibrium from what the law is given: whether it found them, and those that
             `settled` names.
         settled: names of the states that it finds.
@@ -104,6 +105,7 @@ class Kind:
     kept: tuple[str, ...] = ()
     controlled: bool = False
     states: tuple[State, ...] = ()
+    together: type[Any] | None = None
     equilibrium: Callable[..., Any] | None = None
     settled: tuple[str, ...] = ()
     rigid: Callable[..., float] | None = None
@@ -123,6 +125,8 @@ class Kind:
             is_muscle = issubclass(self.component, Muscle)
             named.insert(0, ReflexControl() if is_muscle else Control(self.component.control_count))
         object.__setattr__(self, "terms", tuple(named))
+        if self.together is not None and not {state.name for state in self.states} <= {*self.together._fields}:
+            raise TypeError(f"{self.together.__name__} lacks a state of {self.component.__name__}")
 
     @property
     def name(self) -> str:

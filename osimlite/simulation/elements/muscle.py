@@ -7,7 +7,7 @@ from math import pi, sin
 from typing import Any
 
 from osimlite.errors import ModelError
-from osimlite.forces.muscles import SIGNIFICANT
+from osimlite.forces.muscles import SIGNIFICANT, MuscleInputs
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.kind import Kind
@@ -102,7 +102,7 @@ def muscle(
 
     Args:
         component: its class.
-        law: gives what is recorded, and then rates.
+        law: gives what is recorded, and then rates, from :class:`MuscleInputs` and the parameters.
         rates: of states, of which "fiber_velocity" is one, and what else the law gives.
         parameters: that the law is given.
         more: attributes of the kind.
@@ -115,6 +115,7 @@ def muscle(
         parameters=parameters,
         kept=("length", "rate", "fiber_velocity"),
         controlled=True,
+        together=MuscleInputs,
         labels={"{name}": "tension"},
         told=_told,
         **more,

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from math import nan
 from typing import Any
 
+from osimlite.forces.muscles import MuscleInputs
 from osimlite.forces.old_muscles import (
     ROUNDS,
     TOLERANCE,
@@ -27,21 +28,22 @@ of the tendon, and numbers and curves that are the muscle's own."""
 Fibers = tuple[float, float, float, float]
 
 
-def fibers_at(length: float, fiber_length: float, m: OldMuscle, forces: Forces, own: Any, curves: Any) -> Fibers:
-    """Cosine of pennation and `forces` of fibers of a length (m), the path's length in m."""
+def fibers_at(now: MuscleInputs, m: OldMuscle, forces: Forces, own: Any, curves: Any) -> Fibers:
+    """Cosine of pennation and `forces` of the fibers."""
+    fiber_length = now.fiber_length
     cos = cos_upright(fiber_length, m.height)
-    strain = (length - fiber_length * cos) / m.slack - 1.0
+    strain = (now.length - fiber_length * cos) / m.slack - 1.0
     active, passive, tendon = forces(fiber_length / m.optimal, strain, own, curves)
     return cos, active, passive, tendon
 
 
 def recorded(
-    activation: float, fiber_length: float, fibers: Fibers, m: OldMuscle
+    now: MuscleInputs, fibers: Fibers, m: OldMuscle
 ) -> tuple[float, float, float, float, float, float, float, float]:
     """What is recorded of every muscle; nobody knows of a factor by velocity."""
     cos, active, passive, tendon = fibers
     tension, passive_force = m.strength * tendon, m.strength * passive
-    return tension, activation, fiber_length, cos, active, nan, tension / cos - passive_force, passive_force
+    return tension, now.activation, now.fiber_length, cos, active, nan, tension / cos - passive_force, passive_force
 
 
 def isometric_length(
@@ -78,17 +80,18 @@ def isometric_length(
     return guess.length
 
 
-def strongest(length: float, rate: float, start: float, m: OldMuscle, forces: Forces, own: Any, curves: Any) -> float:
+def strongest(now: MuscleInputs, start: float, m: OldMuscle, forces: Forces, own: Any, curves: Any) -> float:
     """Force (N) in equilibrium at rest, fully activated, times a factor by the rate of the path.
 
     It is what OpenSim takes for the active force along a rigid tendon; see calcInextensibleTendonActiveFiberForce of
     ActivationFiberLengthMuscle_Deprecated. Args as of `isometric_length`.
     """
-    if length < m.slack:
+    if now.length < m.slack:
         return 0.0
-    fiber_length = isometric_length(length, start, 1.0, m, forces, own, curves)
-    _, _, _, tendon = fibers_at(length, fiber_length, m, forces, own, curves)
-    return m.strength * tendon * generic_velocity_factor(rate, m)
+    fiber_length = isometric_length(now.length, start, 1.0, m, forces, own, curves)
+    at_rest = MuscleInputs(now.length, now.rate, 1.0, 1.0, fiber_length, 0.0, 0.0)
+    _, _, _, tendon = fibers_at(at_rest, m, forces, own, curves)
+    return m.strength * tendon * generic_velocity_factor(now.rate, m)
 
 
 def _check(builder: ElementBuilder, force: Any) -> None:

@@ -11,6 +11,7 @@ from osimlite.multibody.functions import Function
 from osimlite.records import dataclass
 from osimlite.simulation.elements.formula import Formula
 from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.kernel_text import arguments_of
 from osimlite.simulation.kernels.controls import with_reflex
 from osimlite.simulation.kernels.functions import table_of_one
 from osimlite.simulation.kernels.programs import program
@@ -218,28 +219,43 @@ class Curve(Parameter):
 
 
 @dataclass(frozen=True)
-class Curves(Parameter):
-    """Properties that are functions of one number; the law is given their tables as one tuple."""
+class Together(Parameter):
+    """Several of these that the law is given as one named tuple.
 
-    names: tuple[str, ...]
+    Attributes:
+        type: the tuple.
+        terms: what is in each of its fields.
+    """
+
+    type: type[Any]
+    terms: tuple[Parameter, ...]
+
+    @property
+    def size(self) -> int:  # type: ignore[override]
+        """How many numbers."""
+        return sum(term.size for term in self.terms)
 
     @property
     def heads(self) -> int:  # type: ignore[override]
-        """How many."""
-        return len(self.names)
+        """How many integers."""
+        return sum(term.heads for term in self.terms)
 
-    def read(self, builder: ElementBuilder, force: Any) -> tuple[Function, ...]:
-        """The functions."""
-        return tuple(Curve(name).read(builder, force) for name in self.names)
+    def read(self, builder: ElementBuilder, force: Any) -> Any:
+        """The tuple."""
+        return self.type(*(term.read(builder, force) for term in self.terms))
 
     def arguments(self, head: int, number: int) -> list[str]:
-        """The tables."""
-        return [f"({', '.join(f'at(p, i[{head + k}])' for k in range(self.heads))})"]
+        """It."""
+        return [f"{self.type.__name__}({', '.join(arguments_of(self.terms, head, number))})"]
 
-    def pack(self, value: Sequence[Function], tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
-        """Places of the tables."""
-        places = [Curve(name).pack(own, tail, where)[0] for name, own in zip(self.names, value, strict=True)]
-        return [place for (place,) in places], ()
+    def functions(self) -> dict[str, Callable[..., Any]]:
+        """What makes it."""
+        return {self.type.__name__: self.type}
+
+    def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
+        """Their integers and numbers, one after another."""
+        packed = [term.pack(own, tail, where) for term, own in zip(self.terms, value, strict=True)]
+        return [place for ints, _ in packed for place in ints], [x for _, numbers in packed for x in numbers]
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from math import cos, pi
 from typing import Any
 
 from osimlite.forces.millard2012_acceleration import (
+    AccelerationCurves,
     Millard2012Acceleration,
     millard2012_acceleration,
     millard2012_acceleration_energy,
@@ -29,7 +30,7 @@ from osimlite.schema.muscles import Millard2012AccelerationMuscle
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kind import DeclaredForce, State
 from osimlite.simulation.elements.muscle import PENNATION, curve, muscle
-from osimlite.simulation.elements.parameters import Fields, Number, positive
+from osimlite.simulation.elements.parameters import Fields, Number, Together, positive
 
 
 def _others(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
@@ -49,9 +50,9 @@ def _check(builder: ElementBuilder, force: Any) -> None:
 
 
 def _energy(force: DeclaredForce, record: Sequence[float]) -> float:
-    _, m, _, _, *curves = force.values
+    _, m, curves = force.values
     known = force.known(record)
-    return millard2012_acceleration_energy(m, known["length"], known["fiber_length"], known["cos_pennation"], *curves)
+    return millard2012_acceleration_energy(m, known["length"], known["fiber_length"], known["cos_pennation"], curves)
 
 
 KIND = muscle(
@@ -74,12 +75,19 @@ KIND = muscle(
         ),
         _others,
     ),
-    curve("active_force_length_curve", ACTIVE_SIZE, active_force_length),
-    curve("force_velocity_curve", VELOCITY_SIZE, force_velocity),
-    curve("fiber_force_length_curve", PASSIVE_SIZE, fiber_force_length),
-    curve("tendon_force_length_curve", TENDON_SIZE, tendon_force_length),
-    curve("fiber_compressive_force_length_curve", COMPRESSIVE_SIZE, fiber_compressive_force_length),
-    curve("fiber_compressive_force_cos_pennation_curve", COMPRESSIVE_SIZE, fiber_compressive_force_cos_pennation),
+    Together(
+        AccelerationCurves,
+        (
+            curve("active_force_length_curve", ACTIVE_SIZE, active_force_length),
+            curve("force_velocity_curve", VELOCITY_SIZE, force_velocity),
+            curve("fiber_force_length_curve", PASSIVE_SIZE, fiber_force_length),
+            curve("tendon_force_length_curve", TENDON_SIZE, tendon_force_length),
+            curve("fiber_compressive_force_length_curve", COMPRESSIVE_SIZE, fiber_compressive_force_length),
+            curve(
+                "fiber_compressive_force_cos_pennation_curve", COMPRESSIVE_SIZE, fiber_compressive_force_cos_pennation
+            ),
+        ),
+    ),
     states=(
         State("activation"),
         State("fiber_length", output="fiber_velocity"),

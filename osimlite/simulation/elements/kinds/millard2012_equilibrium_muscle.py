@@ -6,6 +6,7 @@ from typing import Any
 
 from osimlite.forces.millard2012_equilibrium import (
     Millard2012Equilibrium,
+    MillardCurves,
     millard2012_energy,
     millard2012_equilibrium,
     millard2012_equilibrium_length,
@@ -27,7 +28,7 @@ from osimlite.schema.muscles import Millard2012EquilibriumMuscle
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kind import DeclaredForce, State
 from osimlite.simulation.elements.muscle import SPRING, curve, muscle, require
-from osimlite.simulation.elements.parameters import Fields, Number, positive
+from osimlite.simulation.elements.parameters import Fields, Number, Together, positive
 
 LEAST_DAMPING = 0.001
 """A muscle whose `fiber_damping` is less has none, as in OpenSim."""
@@ -87,10 +88,9 @@ def _check(builder: ElementBuilder, force: Any) -> None:
 
 
 def _energy(force: DeclaredForce, record: Sequence[float]) -> float:
-    _, m, *_, passive_curve, tendon_curve = force.values
+    _, m, curves = force.values
     known = force.known(record)
-    where = known["length"], known["fiber_length"], known["cos_pennation"]
-    return millard2012_energy(m, *where, passive_curve, tendon_curve)
+    return millard2012_energy(m, known["length"], known["fiber_length"], known["cos_pennation"], curves)
 
 
 KIND = muscle(
@@ -111,11 +111,16 @@ KIND = muscle(
         ),
         _others,
     ),
-    curve("active_force_length_curve", ACTIVE_SIZE, active_force_length, _active),
-    curve("force_velocity_curve", VELOCITY_SIZE, force_velocity, _velocity),
-    curve("force_velocity_curve", VELOCITY_SIZE, partial(force_velocity, inverse=True), _inverse),
-    curve("fiber_force_length_curve", PASSIVE_SIZE, fiber_force_length),
-    curve("tendon_force_length_curve", TENDON_SIZE, tendon_force_length),
+    Together(
+        MillardCurves,
+        (
+            curve("active_force_length_curve", ACTIVE_SIZE, active_force_length, _active),
+            curve("force_velocity_curve", VELOCITY_SIZE, force_velocity, _velocity),
+            curve("force_velocity_curve", VELOCITY_SIZE, partial(force_velocity, inverse=True), _inverse),
+            curve("fiber_force_length_curve", PASSIVE_SIZE, fiber_force_length),
+            curve("tendon_force_length_curve", TENDON_SIZE, tendon_force_length),
+        ),
+    ),
     states=(
         State(
             "activation",

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from osimlite.forces.muscles import MuscleInputs
 from osimlite.forces.old_muscles import (
     NOTHING,
     OldMuscle,
@@ -13,11 +14,17 @@ from osimlite.forces.old_muscles import (
 from osimlite.schema.old_muscles import Schutte1993Muscle_Deprecated
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.old_muscle import fibers_at, isometric_length, old_muscle, recorded, strongest
-from osimlite.simulation.elements.parameters import Curves, Fields, Number, positive
+from osimlite.simulation.elements.parameters import Curve, Fields, Number, Together, positive
 from osimlite.simulation.kernels.functions import value_at
 from osimlite.simulation.kernels.pointers import Floats
 
-Tables = tuple[Floats, Floats, Floats]
+
+class SchutteCurves(NamedTuple):
+    """The curves of the muscle."""
+
+    active: Floats
+    passive: Floats
+    tendon: Floats
 
 
 class Schutte(NamedTuple):
@@ -30,63 +37,35 @@ class Schutte(NamedTuple):
     has_curve: float
 
 
-def forces(length: float, strain: float, own: Schutte, curves: Tables) -> tuple[float, float, float]:
+def forces(length: float, strain: float, own: Schutte, curves: SchutteCurves) -> tuple[float, float, float]:
     """Active, passive and tendon force."""
-    active_curve, passive_curve, tendon_curve = curves
-    active, _, _ = value_at(active_curve, length)
-    tendon, _, _ = value_at(tendon_curve, strain)
-    passive = value_at(passive_curve, length)[0] if own.has_curve else schutte_passive_force(length)
+    active, _, _ = value_at(curves.active, length)
+    tendon, _, _ = value_at(curves.tendon, strain)
+    passive = value_at(curves.passive, length)[0] if own.has_curve else schutte_passive_force(length)
     return active, passive, tendon if strain >= 0.0 else 0.0
 
 
-def schutte(
-    length: float,
-    rate: float,
-    excitation: float,
-    activation: float,
-    fiber_length: float,
-    m: OldMuscle,
-    own: Schutte,
-    curves: Tables,
-) -> tuple[float, ...]:
+def schutte(now: MuscleInputs, m: OldMuscle, own: Schutte, curves: SchutteCurves) -> tuple[float, ...]:
     """The muscle at a moment; see Schutte1993Muscle_Deprecated::computeActuation of OpenSim."""
-    fibers = fibers_at(length, fiber_length, m, forces, own, curves)
+    fibers = fibers_at(now, m, forces, own, curves)
     cos, active, passive, tendon = fibers
     if cos > NOTHING:
         borne = max(tendon / cos - passive, 0.0)
-        velocity = schutte_velocity(activation, max(active, 0.0), borne, own.damping) * m.optimal / own.time
+        velocity = schutte_velocity(now.activation, max(active, 0.0), borne, own.damping) * m.optimal / own.time
     else:
-        velocity = rate * rigid_cos(length, m) if abs(tendon) > NOTHING else 0.0
-    activation_rate = scaled_activation_rate(excitation, activation, own.more, own.least, own.time)
-    return *recorded(activation, fiber_length, fibers, m), activation_rate, velocity
+        velocity = now.rate * rigid_cos(now.length, m) if abs(tendon) > NOTHING else 0.0
+    activation_rate = scaled_activation_rate(now.excitation, now.activation, own.more, own.least, own.time)
+    return *recorded(now, fibers, m), activation_rate, velocity
 
 
-def equilibrium(
-    length: float,
-    rate: float,
-    excitation: float,
-    activation: float,
-    fiber_length: float,
-    m: OldMuscle,
-    own: Schutte,
-    curves: Tables,
-) -> tuple[bool, float]:
+def equilibrium(now: MuscleInputs, m: OldMuscle, own: Schutte, curves: SchutteCurves) -> tuple[bool, float]:
     """The fiber length in equilibrium."""
-    return True, isometric_length(length, m.optimal, activation, m, forces, own, curves)
+    return True, isometric_length(now.length, m.optimal, now.activation, m, forces, own, curves)
 
 
-def rigid(
-    length: float,
-    rate: float,
-    excitation: float,
-    activation: float,
-    fiber_length: float,
-    m: OldMuscle,
-    own: Schutte,
-    curves: Tables,
-) -> float:
+def rigid(now: MuscleInputs, m: OldMuscle, own: Schutte, curves: SchutteCurves) -> float:
     """The greatest force."""
-    return strongest(length, rate, m.optimal, m, forces, own, curves)
+    return strongest(now, m.optimal, m, forces, own, curves)
 
 
 def _has_curve(builder: ElementBuilder, force: Schutte1993Muscle_Deprecated) -> tuple[bool]:
@@ -103,5 +82,5 @@ KIND = old_muscle(
         (positive("time_scale"), Number("activation1"), Number("activation2"), positive("damping")),
         _has_curve,
     ),
-    Curves(("active_force_length_curve", "passive_force_length_curve", "tendon_force_length_curve")),
+    Together(SchutteCurves, tuple(Curve(f"{name}_force_length_curve") for name in SchutteCurves._fields)),
 )

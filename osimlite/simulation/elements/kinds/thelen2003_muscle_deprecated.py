@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from osimlite.forces.muscles import MuscleInputs
 from osimlite.forces.old_muscles import (
     NOTHING,
     OldMuscle,
@@ -38,53 +39,29 @@ def forces(length: float, strain: float, own: FirstThelen, curves: tuple[()]) ->
     return thelen_active_force(length, own.width), passive, thelen_tendon_force(strain, own.tendon_strain)
 
 
-def thelen(
-    length: float,
-    rate: float,
-    excitation: float,
-    activation: float,
-    fiber_length: float,
-    m: OldMuscle,
-    own: FirstThelen,
-) -> tuple[float, ...]:
+def thelen(now: MuscleInputs, m: OldMuscle, own: FirstThelen) -> tuple[float, ...]:
     """The muscle at a moment; see Thelen2003Muscle_Deprecated::computeActuation of OpenSim."""
-    fibers = fibers_at(length, fiber_length, m, forces, own, ())
+    fibers = fibers_at(now, m, forces, own, ())
     cos, active, passive, tendon = fibers
     if cos > NOTHING:
-        fastest = own.slowest + min(activation, 1.0) * (own.fastest - own.slowest)
+        fastest = own.slowest + min(now.activation, 1.0) * (own.fastest - own.slowest)
         borne = tendon / cos - passive
-        velocity = thelen_velocity(activation, active, borne, own.damping, own.shape, own.most)
+        velocity = thelen_velocity(now.activation, active, borne, own.damping, own.shape, own.most)
         velocity *= fastest * m.optimal
     else:
-        velocity = rate / rigid_cos(length, m) if abs(tendon) > NOTHING else 0.0
-    time = own.rising if excitation >= activation else own.falling
-    return *recorded(activation, fiber_length, fibers, m), (excitation - activation) / time, velocity
+        velocity = now.rate / rigid_cos(now.length, m) if abs(tendon) > NOTHING else 0.0
+    time = own.rising if now.excitation >= now.activation else own.falling
+    return *recorded(now, fibers, m), (now.excitation - now.activation) / time, velocity
 
 
-def equilibrium(
-    length: float,
-    rate: float,
-    excitation: float,
-    activation: float,
-    fiber_length: float,
-    m: OldMuscle,
-    own: FirstThelen,
-) -> tuple[bool, float]:
+def equilibrium(now: MuscleInputs, m: OldMuscle, own: FirstThelen) -> tuple[bool, float]:
     """The fiber length in equilibrium."""
-    return True, isometric_length(length, m.optimal, activation, m, forces, own, ())
+    return True, isometric_length(now.length, m.optimal, now.activation, m, forces, own, ())
 
 
-def rigid(
-    length: float,
-    rate: float,
-    excitation: float,
-    activation: float,
-    fiber_length: float,
-    m: OldMuscle,
-    own: FirstThelen,
-) -> float:
+def rigid(now: MuscleInputs, m: OldMuscle, own: FirstThelen) -> float:
     """The greatest force."""
-    return strongest(length, rate, m.optimal, m, forces, own, ())
+    return strongest(now, m.optimal, m, forces, own, ())
 
 
 KIND = old_muscle(
