@@ -44,8 +44,8 @@ OLDEST_KNOWN = 10901
 
 _COUNT = etree.XPath("count(descendant-or-self::*)")
 
-_MIXED = etree.XPath("boolean(/descendant::*[*]/text())")
-"""Whether there is text beside an element; blank text the parser leaves out."""
+_MIXED = etree.XPath("/descendant::*[*][text()]")
+"""Elements in which there is text beside an element; blank text the parser leaves out."""
 
 _ATTRIBUTES = etree.XPath("boolean(//@*[name() != 'name' and name() != 'file' and name() != 'Version'])")
 """Whether there is an attribute besides those that mean something."""
@@ -149,7 +149,8 @@ def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = 
     try:
         root = parse(source)
         if to_check:
-            source.mixed = cast("bool", _MIXED(root))
+            mixed = cast("list[etree._Element]", _MIXED(root))
+            source.mixed = [number for number, each in enumerate(root.iter("*")) if each in mixed] if mixed else ()
             source.attributes = cast("bool", _ATTRIBUTES(root))
     except NotWellFormedError as fault:
         from osimlite.document.repair import read_repaired

@@ -49,8 +49,8 @@ class Source:
         """The number of elements, once the parser has found the text well-formed."""
         self.remarks = True
         """Whether there may be comments other than OpenSim's own."""
-        self.mixed: bool | None = None
-        """Whether there is text beside elements, where that has been looked for in a well-formed text."""
+        self.mixed: Sequence[int] | None = None
+        """Elements in which there is text beside elements, where they have been looked for in a well-formed text."""
         self.attributes: bool | None = None
         """Whether there are attributes without a meaning, where they have been looked for in a well-formed text."""
         self._attributes: dict[int, dict[str, Attribute]] = {}

@@ -15,6 +15,8 @@ from math import hypot
 
 Point = tuple[float, float, float]
 """x, y, and the slope there."""
+Numbers = tuple[float, ...]
+"""Those of a curve."""
 
 SECTIONS, FIRST, LAST = 0, 1, 4
 HEAD = 7
@@ -33,7 +35,7 @@ def curve_size(sections: int) -> int:
     return HEAD + (1 + SECTION) * sections
 
 
-def curve(points: Sequence[Point], curviness: Sequence[float]) -> list[float]:
+def curve(points: Sequence[Point], curviness: Sequence[float]) -> Numbers:
     """The numbers of a curve through points, with the curviness of the sections between them, each from 0 to 1.
 
     Raises:
@@ -41,11 +43,11 @@ def curve(points: Sequence[Point], curviness: Sequence[float]) -> list[float]:
     """
     sections = zip(points, points[1:], curviness, strict=False)
     numbers = [x for item in sections for x in _section(*item)]
-    return [float(len(curviness)), *points[0], *points[-1], *(x for x, _, _ in points[1:]), *numbers]
+    return (float(len(curviness)), *points[0], *points[-1], *(x for x, _, _ in points[1:]), *numbers)
 
 
 @lru_cache(maxsize=1024)
-def _section(first: Point, last: Point, curviness: float) -> tuple[float, ...]:
+def _section(first: Point, last: Point, curviness: float) -> Numbers:
     """The numbers of a section."""
     (x0, y0, slope0), (x1, y1, slope1) = first, last
     if not 0.0 <= curviness <= 1.0:
@@ -69,19 +71,21 @@ def _polynomial(p: float, q: float, r: float, s: float) -> tuple[float, ...]:
 def _starts(x: Sequence[float], width: float) -> list[float]:
     """From where the search for u starts; it need not be exact."""
     result: list[float] = []
-    low = 0.0
+    u = step = 0.0
     for node in range(NODES + 1):
-        high = 1.0
-        for _ in range(10):
-            u = 0.5 * (low + high)
-            low, high = (u, high) if _times_u(x, u) < width * node / NODES else (low, u)
-        u = high
-        for _ in range(3):
-            slope = _derivative(x, u)
-            if slope > 0.0:
-                u = min(max(u - (_times_u(x, u) - width * node / NODES) / slope, low), 1.0)
+        low, high, u = u, 1.0, min(u + step, 1.0)
+        for _ in range(ROUNDS):
+            # Newton's method, or halves where it would leave the interval.
+            off, slope = _times_u(x, u) - width * node / NODES, _derivative(x, u)
+            low, high = (u, high) if off < 0.0 else (low, u)
+            before, u = u, u - off / slope if slope > 0.0 else -1.0
+            if not low <= u <= high:
+                u = 0.5 * (low + high)
+            if abs(u - before) < NEAR * NEAR:
+                break
         slope = _derivative(x, u)
-        result += [u, width / NODES / slope if slope > 0.0 else 0.0]
+        step = width / NODES / slope if slope > 0.0 else 0.0
+        result += [u, step]
     return result
 
 

@@ -7,9 +7,10 @@ name, in their order, and gives the numbers of a curve; None stands for a proper
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import cos, radians
 
-from osimlite.forces.bezier import curve, curve_size
+from osimlite.forces.bezier import Numbers, curve, curve_size
 
 ACTIVE_SIZE, VELOCITY_SIZE, PASSIVE_SIZE, TENDON_SIZE = map(curve_size, (5, 4, 2, 2))
 COMPRESSIVE_SIZE = curve_size(1)
@@ -17,8 +18,12 @@ COMPRESSIVE_SIZE = curve_size(1)
 NEAREST = 2.0**-26
 """Lengths as near as that to each other count as one."""
 
+_kept = lru_cache(maxsize=256)
+"""Most muscles of a model have the same curves."""
 
-def active_force_length(shortest: float, transition: float, longest: float, slope: float, least: float) -> list[float]:
+
+@_kept
+def active_force_length(shortest: float, transition: float, longest: float, slope: float, least: float) -> Numbers:
     """Active force over fiber length; it is 1 at 1, where the curve is flat.
 
     Raises:
@@ -47,6 +52,7 @@ def active_force_length(shortest: float, transition: float, longest: float, slop
     )
 
 
+@_kept
 def force_velocity(
     concentric_end: float,
     concentric_near: float,
@@ -58,7 +64,7 @@ def force_velocity(
     eccentric_curviness: float,
     *,
     inverse: bool = False,
-) -> list[float]:
+) -> Numbers:
     """Factor of the active force over fiber velocity, or the velocity over that factor."""
     _require(most > 1.0, "its max_eccentric_velocity_force_multiplier is not above 1")
     _below(concentric_end, concentric_near, "concentric_slope_at_vmax")
@@ -82,9 +88,10 @@ def force_velocity(
     return curve(points, [concentric_curviness] * 2 + [eccentric_curviness] * 2)
 
 
+@_kept
 def fiber_force_length(
     zero: float, one: float, low: float | None = None, stiffness: float | None = None, curviness: float | None = None
-) -> list[float]:
+) -> Numbers:
     """Passive force over fiber length."""
     _require(one > zero, f"its strain_at_zero_force is not less than its strain_at_one_norm_force, {one:.4g}")
     low, stiffness, curviness = _given_or(
@@ -99,9 +106,10 @@ def fiber_force_length(
     return curve(((start, 0.0, 0.0), (foot, low * (foot - middle), low), (end, 1.0, stiffness)), [curviness] * 2)
 
 
+@_kept
 def tendon_force_length(
     one: float, stiffness: float | None = None, toe: float | None = None, curviness: float | None = None
-) -> list[float]:
+) -> Numbers:
     """Force over tendon length."""
     _require(one > NEAREST, f"its strain_at_one_norm_force is not above {NEAREST:.1e}")
     stiffness, toe, curviness = _given_or(
@@ -116,9 +124,10 @@ def tendon_force_length(
     return curve(((1.0, 0.0, 0.0), (control, slope * (control - foot), slope), (end, toe, stiffness)), [curviness] * 2)
 
 
+@_kept
 def fiber_compressive_force_length(
     zero: float, stiffness: float | None = None, curviness: float | None = None
-) -> list[float]:
+) -> Numbers:
     """Force against short fibers over their length."""
     _require(zero > 0.0, "its norm_length_at_zero_force is not positive")
     stiffness, curviness = _given_or((stiffness, curviness), (-2.0 / zero, 0.5), "stiffness_at_zero_length")
@@ -126,9 +135,10 @@ def fiber_compressive_force_length(
     return curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
 
 
+@_kept
 def fiber_compressive_force_cos_pennation(
     angle: float, stiffness: float | None = None, curviness: float | None = None
-) -> list[float]:
+) -> Numbers:
     """Force against steep fibers over the cosine of pennation; the angle of engagement is in degrees."""
     zero = cos(radians(angle))
     _require(0.0 < zero < 1.0, "its engagement_angle_in_degrees is not between 0 and 90")

@@ -95,25 +95,42 @@ def stray_text(subject: Subject, found: FindingSink) -> None:
     ```
     """
     source = subject.source
-    if source is None or source.mixed is False or not source.spans:
+    if source is None or not source.spans:
         return
-    plain = REMARKS.sub(lambda match: " " * len(match[0]), source.text)
-    plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), plain)
-    texts = {match.span(1) for pattern in (_AFTER, _BEFORE) for match in pattern.finditer(plain)}
     in_values = [
         (source.spans[note.number].start, source.spans[note.number].end)
         for note in subject.notes
         if note.kind == "child-in-value"
     ]
-    for start, end in sorted(texts):
+    for start, stray in sorted(_beside_elements(source)):
         # Text outside the root is worse, and another rule speaks of it.
         if any(first < start < last for first, last in in_values) or start >= source.spans[0].end:
             continue
-        text = plain[start:end].strip().splitlines()[0]
+        text = stray.splitlines()[0]
         shown = "U+FEFF (a byte-order mark)" if text == "\ufeff" else f"'{text}'"
-        begin = start + len(plain[start:end]) - len(plain[start:end].lstrip())
-        whole = without_text(source, begin, begin + len(plain[start:end].strip()))
+        whole = without_text(source, start, start + len(stray))
         found(f"OpenSim ignores the text {shown} between elements", at=source.position(start, len(text)), fix=whole)
+
+
+def _beside_elements(source: Source) -> Iterator[tuple[int, str]]:
+    """Where text stands beside elements, and the text; what stands in a comment is none."""
+    if source.mixed is None:
+        plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), _without_remarks(source.text))
+        for start, end in {match.span(1) for pattern in (_AFTER, _BEFORE) for match in pattern.finditer(plain)}:
+            yield start, plain[start:end].rstrip()
+        return
+    for number in source.mixed:
+        begin, around = source.spans[number].tag_end, source.spans[number].inner_end
+        inner = [source.spans[child] for child in source.children(number)]
+        for end, behind in (*((span.start, span.end) for span in inner), (around, around)):
+            plain = _without_remarks(source.text[begin:end])
+            if text := plain.strip():
+                yield begin + plain.index(text), text
+            begin = behind
+
+
+def _without_remarks(text: str) -> str:
+    return REMARKS.sub(lambda match: " " * len(match[0]), text)
 
 
 @rule("OSIM110", "defaults", severity=WARNING, mends="safe")

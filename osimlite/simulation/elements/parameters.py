@@ -193,6 +193,12 @@ class Fields(Parameter):
 class Vector(Numbers):
     """Several numbers, of which the law is given the place."""
 
+    def read(self, builder: ElementBuilder, force: Any) -> tuple[float, ...]:
+        """The numbers as they are: muscles share those of their curves."""
+        values = tuple(self.of(builder, force))
+        builder.check(force, values)
+        return values
+
     def arguments(self, head: int, number: int) -> list[str]:
         """Where they begin."""
         return [f"at(p, {number})"]
