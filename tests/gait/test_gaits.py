@@ -38,7 +38,7 @@ NEAR = {
     **{name: (STEADY_START[name][0] - 0.1, STEADY_START[name][0] + 0.1) for name in JOINTS},
     **{f"{name}/speed": (STEADY_START[name][1] - 0.4, STEADY_START[name][1] + 0.4) for name in JOINTS},
 }
-FEW = {"samples": 512, "tries": 3, "enough": 1, "budget": 12}
+FEW = {"samples": 256, "tries": 3, "enough": 1, "budget": 4}
 
 
 @pytest.fixture(scope="module")
@@ -87,14 +87,8 @@ def test_the_files_tell_what_was_found_and_how(found):
     assert heads.split(",")[:3] == [INERTIA, AHEAD, "largest_multiplier"] and len(rows) == gait.cycles
 
 
-def test_the_same_seed_finds_the_same(found, tmp_path):
-    again = find_gait(plan(dynamic_walker(), NEAR), tmp_path, **FEW, threads=1)
-    assert (tmp_path / "best.osim").read_bytes() == (found[1] / "best.osim").read_bytes()
-    assert again.found.cycle.state.tolist() == found[0].found.cycle.state.tolist()
-
-
-def test_another_walker_is_spared_unless_forced(found, tmp_path):
-    _, folder, _ = found
+def test_another_walker_is_spared_unless_forced_and_the_same_seed_finds_the_same(found, tmp_path):
+    gait, folder, _ = found
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     with pytest.raises(SettingError, match=r"seed \(0 before, 1 now\); .*--force"):
         find_gait(plan(dynamic_walker(), NEAR), folder, **FEW, seed=1)
@@ -105,7 +99,8 @@ def test_another_walker_is_spared_unless_forced(found, tmp_path):
             find_gait(plan(dynamic_walker(), NEAR), tmp_path, **FEW)
         assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
         (tmp_path / name).unlink()
-    find_gait(plan(dynamic_walker(), NEAR), folder, **FEW, force=True)
+    again = find_gait(plan(dynamic_walker(), NEAR), folder, **FEW, force=True, threads=1)
+    assert again.found.cycle.state.tolist() == gait.found.cycle.state.tolist()
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
@@ -113,7 +108,7 @@ def test_another_walker_is_spared_unless_forced(found, tmp_path):
     ("said", "choice"),
     [
         ("seed is a whole number from 0 to", {"seed": -1}),
-        ("seed is a whole number from 0 to", {"seed": 2**32 - 6}),
+        ("seed is a whole number from 0 to", {"seed": 2**32 - 4}),
         ("'samples' is a whole number from 1 on", {"samples": 0}),
         ("'budget' is a whole number from 0 on", {"budget": -1}),
         ("'perturb' is a positive number", {"perturb": float("nan")}),
@@ -166,7 +161,7 @@ def test_random_walkers_do_not_depend_on_the_numbers_that_are_searched():
     for slope, radius in ((2.7, 0.1), (3.1, 0.17)):
         given = {"slope": slope, "foot_radius": radius}
         made = plan(lambda numbers, given=given: human_walker(**(given | numbers)), ranges, parameters=given)
-        found.append(CycleSearch(made).candidates(2048, 0))
+        found.append(CycleSearch(made).candidates(512, 0))
     assert len(found[0]) > 3
     assert [each.miss for each in found[0]] == [each.miss for each in found[1]]
     for one, other in zip(*found, strict=True):
@@ -231,7 +226,7 @@ def test_walkers_that_only_fall_are_told_of(tmp_path):
 
 def test_the_command_writes_a_walker(tmp_path):
     words = [f"--vary={name}={low!r}:{high!r}" for name, (low, high) in NEAR.items()]
-    options = ["--samples=512", "--tries=3", "--enough=1", "--budget=0", "--start-digits=4", "-o", str(tmp_path)]
+    options = ["--samples=256", "--tries=3", "--enough=1", "--budget=0", "--start-digits=4", "-o", str(tmp_path)]
     done = CliRunner().invoke(app(["find-gait"]), ["find-gait", "dynamic-walker", *words, *options])
     assert "largest multiplier" in done.output and done.exit_code in (0, 1)
     start = json.loads((tmp_path / "summary.json").read_text())["start"]
