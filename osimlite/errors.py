@@ -81,14 +81,10 @@ class MissingNameError(ModelError, AttributeError):
 
 
 class SimulationError(OsimliteError):
-    """The motion cannot be computed any further.
-
-    Attributes:
-        trajectory: what was recorded up to there, an :class:`osimlite.simulation.Trajectory`; None before any step.
-    """
+    """The motion cannot be computed any further."""
 
     exit_code = 1
-    trajectory: Any = None
+    trajectory: Any = None  # what was recorded up to there, an `Trajectory`; None before any step
 
 
 class SettingError(SimulationError):

@@ -25,23 +25,14 @@ MISSPELT = ("<geometry>RFootContact ", "<geometry>RFootContct ")
 
 
 class Motion(NamedTuple):
-    """A motion of the tour.
+    """A motion of the tour."""
 
-    Attributes:
-        model: the built-in model that moves.
-        to: how long, s.
-        title: what becomes of it.
-        told: says what came out, from the motion.
-        seen: what else there is to see on its page.
-        command: what to try with it next; {} is the folder of the tour.
-    """
-
-    model: str
-    to: float
-    title: str
-    told: Callable[[Trajectory], str]
-    seen: str
-    command: str
+    model: str  # the built-in model that moves
+    to: float  # how long, s
+    title: str  # what becomes of it
+    told: Callable[[Trajectory], str]  # says what came out, from the motion
+    seen: str  # what else there is to see on its page
+    command: str  # what to try with it next; {} is the folder of the tour
 
 
 @command

@@ -79,17 +79,11 @@ MESHES = (".vtp", ".stl", ".obj")
 
 
 class Package(NamedTuple):
-    """A package that an extra asks for.
+    """A package that an extra asks for."""
 
-    Attributes:
-        name: on the package index.
-        version: installed; "" if it is not.
-        trouble: why it cannot be imported, though it is installed; else "".
-    """
-
-    name: str
-    version: str
-    trouble: str
+    name: str  # on the package index
+    version: str  # installed; "" if it is not
+    trouble: str  # why it cannot be imported, though it is installed; else ""
 
 
 @command

@@ -136,25 +136,16 @@ class Nearby:
 
 @dataclass
 class GaitReport:
-    """What was found out about a walker.
+    """What was found out about a walker."""
 
-    Attributes:
-        model: its name.
-        coordinates: in the order of the state.
-        walk: from the start that was given.
-        cycle: that it settles into, if there is one.
-        why_not: why no cycle was found, else "".
-        skipped: forces that were left out.
-    """
-
-    model: str
-    coordinates: list[str]
-    walk: Walk
-    cycle: Cycle | None = None
-    why_not: str = ""
+    model: str  # its name
+    coordinates: list[str]  # in the order of the state
+    walk: Walk  # from the start that was given
+    cycle: Cycle | None = None  # that it settles into, if there is one
+    why_not: str = ""  # why no cycle was found, else ""
     nearby: list[Nearby] = field(default_factory=list)
     basin: Basin | None = None
-    skipped: Sequence[str] = ()
+    skipped: Sequence[str] = ()  # forces that were left out
 
 
 def _walk(

@@ -18,25 +18,17 @@ from osimlite.records import dataclass
 
 @dataclass(frozen=True)
 class Exporter:
-    """A format.
+    """A format."""
 
-    Attributes:
-        name: of the format in ``osimlite translate --to``, or of the option of ``osimlite view`` that names the file.
-        command: "translate" or "view".
-        help: what is written.
-        write: of "translate" a function of a model and its choices as :func:`osimlite.to_urdf`, which returns what has
-            `write`, `fidelity` and `robot` as that of :class:`osimlite.translate.Urdf`; of "view" a function of a
-            :class:`osimlite.view.shown.Shown`, a path and the choices, which writes the file and says what it wrote.
-        choices: that it has besides.
-        usual: whether it is taken if none is named.
-    """
-
-    name: str
-    command: str
-    help: str
+    name: str  # of the format in `osimlite translate --to`, or of the option of `osimlite view` that names the file
+    command: str  # "translate" or "view"
+    help: str  # what is written
+    # of "translate" a function of a model and its choices as `to_urdf`, which returns what has `write`, `fidelity`
+    # and `robot` as that of `Urdf`; of "view" a function of a `Shown`, a path and the choices, which writes the file
+    # and says what it wrote
     write: Callable[..., Any]
-    choices: tuple[Choice, ...] = ()
-    usual: bool = False
+    choices: tuple[Choice, ...] = ()  # that it has besides
+    usual: bool = False  # whether it is taken if none is named
 
 
 @cache

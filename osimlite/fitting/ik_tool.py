@@ -36,17 +36,11 @@ UNNAMED = ("", "Unassigned")
 
 
 class Tasks(NamedTuple):
-    """What inverse kinematics is asked for.
+    """What inverse kinematics is asked for."""
 
-    Attributes:
-        weights: of the markers that are fitted or reported, in the order of the data.
-        goals: coordinates that are to have values.
-        wanted: these values (t, k), rad or m.
-    """
-
-    weights: dict[str, float]
-    goals: list[Goal]
-    wanted: Array
+    weights: dict[str, float]  # of the markers that are fitted or reported, in the order of the data
+    goals: list[Goal]  # coordinates that are to have values
+    wanted: Array  # these values (t, k), rad or m
 
 
 def tasks_of(

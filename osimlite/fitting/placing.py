@@ -25,17 +25,11 @@ from osimlite.simulation.states import StateLayout, in_model_order
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """Markers that were placed.
+    """Markers that were placed."""
 
-    Attributes:
-        pose: of the model as the subject stood, with the errors of the markers before they were moved.
-        removed: markers of the model that the data do not have; it has them no more.
-        moved: by how much each marker was moved in its frame, m.
-    """
-
-    pose: FittedMotion
-    removed: tuple[str, ...]
-    moved: dict[str, float]
+    pose: FittedMotion  # of the model as the subject stood, with the errors of the markers before they were moved
+    removed: tuple[str, ...]  # markers of the model that the data do not have; it has them no more
+    moved: dict[str, float]  # by how much each marker was moved in its frame, m
 
 
 def place_markers(

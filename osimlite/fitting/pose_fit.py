@@ -25,26 +25,17 @@ from osimlite.simulation.system import System
 
 
 class Poses(NamedTuple):
-    """Poses that were found.
+    """Poses that were found."""
 
-    Attributes:
-        values: of all coordinates (t, n), rad and m.
-        places: of the markers in these poses (t, m, 3), m.
-        turns: of the sensors from where they were measured (t, k, 3), in ground, rad; NaN where one was not.
-        costs: half the weighted means of the squared distances of the markers and of the squared angles of the sensors,
-            and the squares of the goals (t,).
-        steps: Newton steps that were taken (t,).
-        unseen: frames of which nothing was measured: they have the pose of the frame before.
-        unsettled: frames in which the search ended before the best pose was certain.
-    """
-
-    values: Array
-    places: Array
-    turns: Array
+    values: Array  # of all coordinates (t, n), rad and m
+    places: Array  # of the markers in these poses (t, m, 3), m
+    turns: Array  # of the sensors from where they were measured (t, k, 3), in ground, rad; NaN where one was not
+    # half the weighted means of the squared distances of the markers and of the squared angles of the sensors, and
+    # the squares of the goals (t,)
     costs: Array
-    steps: Array
-    unseen: tuple[int, ...]
-    unsettled: tuple[int, ...]
+    steps: Array  # Newton steps that were taken (t,)
+    unseen: tuple[int, ...]  # frames of which nothing was measured: they have the pose of the frame before
+    unsettled: tuple[int, ...]  # frames in which the search ended before the best pose was certain
 
 
 class PoseFit:

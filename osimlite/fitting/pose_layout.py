@@ -24,15 +24,10 @@ SCAN = 2001
 
 @dataclass(frozen=True)
 class Marker:
-    """A point of a body whose place is measured.
+    """A point of a body whose place is measured."""
 
-    Attributes:
-        station: body and point.
-        weight: how much its squared distance counts beside those of others.
-    """
-
-    station: StationPlacement
-    weight: float = 1.0
+    station: StationPlacement  # body and point
+    weight: float = 1.0  # how much its squared distance counts beside those of others
 
 
 @dataclass(frozen=True)

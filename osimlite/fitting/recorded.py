@@ -16,23 +16,14 @@ from osimlite.text import did_you_mean, listed
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Numbers of m things at t times.
+    """Numbers of m things at t times."""
 
-    Attributes:
-        names: of the things (m,).
-        times: (t,), s.
-        values: of each time and thing (t, m, ...); NaN where it was not seen.
-        file: where they were read from.
-        noun: what the things are.
-        shape: of the numbers of one thing.
-    """
-
-    names: tuple[str, ...]
-    times: Array
-    values: Array
-    file: str | None = None
-    noun: ClassVar[str]
-    shape: ClassVar[tuple[int, ...]]
+    names: tuple[str, ...]  # of the things (m,)
+    times: Array  # (t,), s
+    values: Array  # of each time and thing (t, m, ...); NaN where it was not seen
+    file: str | None = None  # where they were read from
+    noun: ClassVar[str]  # what the things are
+    shape: ClassVar[tuple[int, ...]]  # of the numbers of one thing
 
     def __post_init__(self) -> None:
         twice = sorted({name for name in self.names if self.names.count(name) > 1})

@@ -11,23 +11,14 @@ from typing import NamedTuple
 
 
 class Umberger2010(NamedTuple):
-    """What the law must know of a muscle and of the probe; the last ones are 1 for yes and 0 for no.
+    """What the law must know of a muscle and of the probe; the last ones are 1 for yes and 0 for no."""
 
-    Attributes:
-        max_contraction_velocity: optimal fiber lengths a second.
-        optimal_fiber_length: m.
-        mass: kg.
-        ratio_slow_twitch_fibers: part of the fibers.
-        muscle_effort_scaling_factor: of excitation, activation and active force.
-        aerobic_factor: of all heat.
-    """
-
-    max_contraction_velocity: float
-    optimal_fiber_length: float
-    mass: float
-    ratio_slow_twitch_fibers: float
-    muscle_effort_scaling_factor: float
-    aerobic_factor: float
+    max_contraction_velocity: float  # optimal fiber lengths a second
+    optimal_fiber_length: float  # m
+    mass: float  # kg
+    ratio_slow_twitch_fibers: float  # part of the fibers
+    muscle_effort_scaling_factor: float  # of excitation, activation and active force
+    aerobic_factor: float  # of all heat
     activation_maintenance_rate_on: float
     shortening_rate_on: float
     mechanical_work_rate_on: float
@@ -94,26 +85,17 @@ def umberger2010(
 
 
 class Bhargava2004(NamedTuple):
-    """What the law must know of a muscle and of the probe; the last ones are 1 for yes and 0 for no.
+    """What the law must know of a muscle and of the probe; the last ones are 1 for yes and 0 for no."""
 
-    Attributes:
-        max_isometric_force: N.
-        optimal_fiber_length: m.
-        mass: kg.
-        ratio_slow_twitch_fibers: part of the fibers.
-        activation_constant_slow_twitch: W/kg, and likewise of fast fibers, and of maintenance.
-        muscle_effort_scaling_factor: of excitation, activation and active force.
-    """
-
-    max_isometric_force: float
-    optimal_fiber_length: float
-    mass: float
-    ratio_slow_twitch_fibers: float
-    activation_constant_slow_twitch: float
+    max_isometric_force: float  # N
+    optimal_fiber_length: float  # m
+    mass: float  # kg
+    ratio_slow_twitch_fibers: float  # part of the fibers
+    activation_constant_slow_twitch: float  # W/kg, and likewise of fast fibers, and of maintenance
     activation_constant_fast_twitch: float
     maintenance_constant_slow_twitch: float
     maintenance_constant_fast_twitch: float
-    muscle_effort_scaling_factor: float
+    muscle_effort_scaling_factor: float  # of excitation, activation and active force
     activation_rate_on: float
     maintenance_rate_on: float
     shortening_rate_on: float
@@ -184,19 +166,12 @@ def recruited(excitation: float, ratio_slow_twitch_fibers: float) -> tuple[float
 
 
 class Smoothed(NamedTuple):
-    """What the smooth law must know besides; 1 is yes and 0 is no.
+    """What the smooth law must know besides; 1 is yes and 0 is no."""
 
-    Attributes:
-        form: of the transitions: 0 is none, 1 the hyperbolic tangent, 2 the function of Huber.
-        velocity_smoothing: how sharp the transition of shortening to lengthening is.
-        power_smoothing: how sharply negative power is kept out.
-        heat_rate_smoothing: how sharply heat is kept above 1 W/kg.
-    """
-
-    form: float
-    velocity_smoothing: float
-    power_smoothing: float
-    heat_rate_smoothing: float
+    form: float  # of the transitions: 0 is none, 1 the hyperbolic tangent, 2 the function of Huber
+    velocity_smoothing: float  # how sharp the transition of shortening to lengthening is
+    power_smoothing: float  # how sharply negative power is kept out
+    heat_rate_smoothing: float  # how sharply heat is kept above 1 W/kg
 
 
 def bhargava2004_smoothed(

@@ -25,90 +25,51 @@ ROUNDS, STEP = 500, 0.75
 
 
 class Millard2012Acceleration(NamedTuple):
-    """The numbers of a muscle.
+    """The numbers of a muscle."""
 
-    Attributes:
-        strength: max_isometric_force F, N.
-        optimal: optimal_fiber_length, m.
-        slack: tendon_slack_length, m.
-        fastest: max_contraction_velocity, 1/s.
-        mass: kg.
-        tendon_damping: tendon_force_length_damping, s, as all of them.
-        short_damping: fiber_compressive_force_length_damping.
-        passive_damping: fiber_force_length_damping.
-        steep_damping: fiber_compressive_force_cos_pennation_damping.
-        fiber_damping: over F.
-        rising: activation time constant, s.
-        falling: deactivation time constant, s.
-        least: activation that the rate knows.
-        height: as of `pennation`, with the three that follow.
-        optimal_cos: of pennation at optimal length.
-    """
-
-    strength: float
-    optimal: float
-    slack: float
-    fastest: float
-    mass: float
-    tendon_damping: float
-    short_damping: float
-    passive_damping: float
-    steep_damping: float
-    fiber_damping: float
-    rising: float
-    falling: float
-    least: float
-    height: float
+    strength: float  # max_isometric_force F, N
+    optimal: float  # optimal_fiber_length, m
+    slack: float  # tendon_slack_length, m
+    fastest: float  # max_contraction_velocity, 1/s
+    mass: float  # kg
+    tendon_damping: float  # tendon_force_length_damping, s, as all of them
+    short_damping: float  # fiber_compressive_force_length_damping
+    passive_damping: float  # fiber_force_length_damping
+    steep_damping: float  # fiber_compressive_force_cos_pennation_damping
+    fiber_damping: float  # over F
+    rising: float  # activation time constant, s
+    falling: float  # deactivation time constant, s
+    least: float  # activation that the rate knows
+    height: float  # as of `pennation`, with the three that follow
     shortest: float
     largest_sin: float
     least_cos: float
-    optimal_cos: float
+    optimal_cos: float  # of pennation at optimal length
 
 
 class AccelerationCurves(NamedTuple):
-    """The curves of a muscle, as `curve_value` takes them.
+    """The curves of a muscle, as `curve_value` takes them."""
 
-    Attributes:
-        active: active force over fiber length.
-        velocity: factor of the active force over fiber velocity.
-        passive: passive force over fiber length.
-        tendon: force over tendon length.
-        short: force against short fibers over their length.
-        steep: force against steep fibers over the cosine of pennation.
-    """
-
-    active: Sequence[float]
-    velocity: Sequence[float]
-    passive: Sequence[float]
-    tendon: Sequence[float]
-    short: Sequence[float]
-    steep: Sequence[float]
+    active: Sequence[float]  # active force over fiber length
+    velocity: Sequence[float]  # factor of the active force over fiber velocity
+    passive: Sequence[float]  # passive force over fiber length
+    tendon: Sequence[float]  # force over tendon length
+    short: Sequence[float]  # force against short fibers over their length
+    steep: Sequence[float]  # force against steep fibers over the cosine of pennation
 
 
 class Moment(NamedTuple):
-    """What fibers, tendon and the mass between them do.
+    """What fibers, tendon and the mass between them do."""
 
-    Attributes:
-        cos: of pennation.
-        by_length: active force at rest, fully activated.
-        by_velocity: factor of the active force by velocity.
-        passive: what fibers bear besides the active force, N.
-        tension: of the tendon, N.
-        acceleration: of the fiber length, m/s^2.
-        slope: its derivative over fiber length at the same speeds, 1/s^2.
-        stiffness: of the fibers along the tendon, N/m.
-        tendon_stiffness: N/m.
-    """
-
-    cos: float
-    by_length: float
-    by_velocity: float
-    passive: float
-    tension: float
-    acceleration: float
-    slope: float
-    stiffness: float
-    tendon_stiffness: float
+    cos: float  # of pennation
+    by_length: float  # active force at rest, fully activated
+    by_velocity: float  # factor of the active force by velocity
+    passive: float  # what fibers bear besides the active force, N
+    tension: float  # of the tendon, N
+    acceleration: float  # of the fiber length, m/s^2
+    slope: float  # its derivative over fiber length at the same speeds, 1/s^2
+    stiffness: float  # of the fibers along the tendon, N/m
+    tendon_stiffness: float  # N/m
 
 
 def moment(

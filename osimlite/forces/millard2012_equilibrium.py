@@ -28,56 +28,33 @@ SMALLEST = 2.0**-26
 
 
 class Millard2012Equilibrium(NamedTuple):
-    """The numbers of a muscle.
+    """The numbers of a muscle."""
 
-    Attributes:
-        strength: max_isometric_force F, N.
-        optimal: optimal_fiber_length, m.
-        slack: tendon_slack_length, m.
-        fastest: max_contraction_velocity, 1/s.
-        rising: activation_time_constant, s.
-        falling: deactivation_time_constant, s.
-        is_rigid: ignore_tendon_compliance, 1 or 0.
-        is_excited: ignore_activation_dynamics, 1 or 0: the excitation is the activation.
-        damping: of the fibers, over F; 0 if they have none.
-        least: activation.
-        height: as of `pennation`, with the three that follow.
-        smallest: fiber length that the curves and pennation allow, m.
-    """
-
-    strength: float
-    optimal: float
-    slack: float
-    fastest: float
-    rising: float
-    falling: float
-    is_rigid: float
-    is_excited: float
-    damping: float
-    least: float
-    height: float
+    strength: float  # max_isometric_force F, N
+    optimal: float  # optimal_fiber_length, m
+    slack: float  # tendon_slack_length, m
+    fastest: float  # max_contraction_velocity, 1/s
+    rising: float  # activation_time_constant, s
+    falling: float  # deactivation_time_constant, s
+    is_rigid: float  # ignore_tendon_compliance, 1 or 0
+    is_excited: float  # ignore_activation_dynamics, 1 or 0: the excitation is the activation
+    damping: float  # of the fibers, over F; 0 if they have none
+    least: float  # activation
+    height: float  # as of `pennation`, with the three that follow
     shortest: float
     largest_sin: float
     least_cos: float
-    smallest: float
+    smallest: float  # fiber length that the curves and pennation allow, m
 
 
 class MillardCurves(NamedTuple):
-    """The curves of a muscle, as `curve_value` takes them.
+    """The curves of a muscle, as `curve_value` takes them."""
 
-    Attributes:
-        active: active force over fiber length.
-        velocity: factor of the active force over fiber velocity.
-        inverse: roughly the inverse of that.
-        passive: passive force over fiber length.
-        tendon: force over tendon length.
-    """
-
-    active: Sequence[float]
-    velocity: Sequence[float]
-    inverse: Sequence[float]
-    passive: Sequence[float]
-    tendon: Sequence[float]
+    active: Sequence[float]  # active force over fiber length
+    velocity: Sequence[float]  # factor of the active force over fiber velocity
+    inverse: Sequence[float]  # roughly the inverse of that
+    passive: Sequence[float]  # passive force over fiber length
+    tendon: Sequence[float]  # force over tendon length
 
 
 def millard2012_equilibrium(

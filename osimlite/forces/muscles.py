@@ -17,25 +17,15 @@ NO_ANGLE = 2.0**-52
 
 
 class MuscleInputs(NamedTuple):
-    """What the law of a muscle is given of a moment; a state that the muscle has not is 0.
+    """What the law of a muscle is given of a moment; a state that the muscle has not is 0."""
 
-    Attributes:
-        length: of the path, m.
-        rate: of it, m/s.
-        excitation: the control.
-        activation: state.
-        fiber_length: state, m.
-        fiber_velocity: state, m/s.
-        normalized_tendon_force: state.
-    """
-
-    length: float
-    rate: float
-    excitation: float
-    activation: float = 0.0
-    fiber_length: float = 0.0
-    fiber_velocity: float = 0.0
-    normalized_tendon_force: float = 0.0
+    length: float  # of the path, m
+    rate: float  # of it, m/s
+    excitation: float  # the control
+    activation: float = 0.0  # state
+    fiber_length: float = 0.0  # state, m
+    fiber_velocity: float = 0.0  # state, m/s
+    normalized_tendon_force: float = 0.0  # state
 
 
 def first_order_activation_rate(

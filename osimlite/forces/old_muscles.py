@@ -26,35 +26,21 @@ TENDON_MODULUS, TENDON_STRENGTH = 1200.0, 32.0
 
 
 class OldMuscle(NamedTuple):
-    """The numbers that all these muscles have.
+    """The numbers that all these muscles have."""
 
-    Attributes:
-        strength: max_isometric_force, N.
-        optimal: optimal_fiber_length, m.
-        slack: tendon_slack_length, m.
-        fastest: max_contraction_velocity, 1/s.
-        height: of the fibers, optimal sin(pennation_angle_at_optimal), m.
-    """
-
-    strength: float
-    optimal: float
-    slack: float
-    fastest: float
-    height: float
+    strength: float  # max_isometric_force, N
+    optimal: float  # optimal_fiber_length, m
+    slack: float  # tendon_slack_length, m
+    fastest: float  # max_contraction_velocity, 1/s
+    height: float  # of the fibers, optimal sin(pennation_angle_at_optimal), m
 
 
 class Guess(NamedTuple):
-    """A guess of where fibers and tendon are in equilibrium.
+    """A guess of where fibers and tendon are in equilibrium."""
 
-    Attributes:
-        length: of the fibers, m.
-        cos: of pennation.
-        strain: of the tendon, not negative.
-    """
-
-    length: float
-    cos: float
-    strain: float
+    length: float  # of the fibers, m
+    cos: float  # of pennation
+    strain: float  # of the tendon, not negative
 
 
 def cos_upright(length: float, height: float) -> float:

@@ -25,50 +25,29 @@ how often an interval is halved."""
 
 
 class SmoothMuscle(NamedTuple):
-    """The numbers that both muscles have.
+    """The numbers that both muscles have."""
 
-    Attributes:
-        strength: max_isometric_force, N.
-        optimal: optimal_fiber_length, m.
-        slack: tendon_slack_length, m.
-        fastest: max_contraction_velocity, 1/s.
-        scale: active_force_width_scale.
-        damping: fiber_damping.
-        passive: whether passive fibers bear a force.
-        follows: whether activation is a state of its own, and not the excitation.
-        height: of the fibers, optimal sin(pennation_angle_at_optimal), m.
-        rising: activation_time_constant, s.
-        falling: deactivation_time_constant, s.
-        sharpness: activation_dynamics_smoothing.
-    """
-
-    strength: float
-    optimal: float
-    slack: float
-    fastest: float
-    scale: float
-    damping: float
-    height: float
-    passive: float
-    follows: float
-    rising: float
-    falling: float
-    sharpness: float
+    strength: float  # max_isometric_force, N
+    optimal: float  # optimal_fiber_length, m
+    slack: float  # tendon_slack_length, m
+    fastest: float  # max_contraction_velocity, 1/s
+    scale: float  # active_force_width_scale
+    damping: float  # fiber_damping
+    height: float  # of the fibers, optimal sin(pennation_angle_at_optimal), m
+    passive: float  # whether passive fibers bear a force
+    follows: float  # whether activation is a state of its own, and not the excitation
+    rising: float  # activation_time_constant, s
+    falling: float  # deactivation_time_constant, s
+    sharpness: float  # activation_dynamics_smoothing
 
 
 class SmoothTendon(NamedTuple):
-    """The numbers of De Groote's muscle besides.
+    """The numbers of De Groote's muscle besides."""
 
-    Attributes:
-        passive_strain: passive_fiber_strain_at_one_norm_force.
-        growth: the k of the tendon's force 0.2 (exp(k (l - 1)) - 1) at a length l, see `tendon_growth`.
-        elastic: whether the tendon is.
-        explicit: whether its force changes so that it stays in equilibrium with the fibers; if not, as a solver says.
-    """
-
-    passive_strain: float
-    growth: float
-    elastic: float
+    passive_strain: float  # passive_fiber_strain_at_one_norm_force
+    growth: float  # the k of the tendon's force 0.2 (exp(k (l - 1)) - 1) at a length l, see `tendon_growth`
+    elastic: float  # whether the tendon is
+    # whether its force changes so that it stays in equilibrium with the fibers; if not, as a solver says
     explicit: float
 
 

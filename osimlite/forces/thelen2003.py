@@ -28,73 +28,43 @@ SMALLEST = 2.0**-26
 
 
 class Thelen2003(NamedTuple):
-    """The numbers of a muscle.
+    """The numbers of a muscle."""
 
-    Attributes:
-        strength: max_isometric_force F, N.
-        optimal: optimal_fiber_length, m.
-        slack: tendon_slack_length, m.
-        fastest: max_contraction_velocity, 1/s.
-        rising: activation_time_constant, s.
-        falling: deactivation_time_constant, s.
-        least: minimum_activation.
-        width: KshapeActive.
-        shape: Af.
-        most: Flen.
-        bound: fv_linear_extrap_threshold.
-        height: as of `pennation`, with the three that follow.
-        toe: as of `tendon_shape`, with the three that follow.
-        passive_growth: KshapePassive / FmaxMuscleStrain.
-        passive_factor: 1 / (exp(KshapePassive) - 1).
-    """
-
-    strength: float
-    optimal: float
-    slack: float
-    fastest: float
-    rising: float
-    falling: float
-    least: float
-    width: float
-    shape: float
-    most: float
-    bound: float
-    height: float
+    strength: float  # max_isometric_force F, N
+    optimal: float  # optimal_fiber_length, m
+    slack: float  # tendon_slack_length, m
+    fastest: float  # max_contraction_velocity, 1/s
+    rising: float  # activation_time_constant, s
+    falling: float  # deactivation_time_constant, s
+    least: float  # minimum_activation
+    width: float  # KshapeActive
+    shape: float  # Af
+    most: float  # Flen
+    bound: float  # fv_linear_extrap_threshold
+    height: float  # as of `pennation`, with the three that follow
     shortest: float
     largest_sin: float
     least_cos: float
-    toe: float
+    toe: float  # as of `tendon_shape`, with the three that follow
     growth: float
     factor: float
     slope: float
-    passive_growth: float
-    passive_factor: float
+    passive_growth: float  # KshapePassive / FmaxMuscleStrain
+    passive_factor: float  # 1 / (exp(KshapePassive) - 1)
 
 
 class Fibers(NamedTuple):
-    """Fibers of some length (m) in a muscle: what they and the tendon would bear, and the slopes of that.
+    """Fibers of some length (m) in a muscle: what they and the tendon would bear, and the slopes of that."""
 
-    Attributes:
-        length: m.
-        cos: of pennation.
-        is_taut: whether the tendon is longer than slack.
-        tendon: its force.
-        tendon_slope: over its normalized length.
-        active: force at rest, fully activated.
-        active_slope: over the normalized length.
-        passive: force.
-        passive_slope: over the normalized length.
-    """
-
-    length: float
-    cos: float
-    is_taut: bool
-    tendon: float
-    tendon_slope: float
-    active: float
-    active_slope: float
-    passive: float
-    passive_slope: float
+    length: float  # m
+    cos: float  # of pennation
+    is_taut: bool  # whether the tendon is longer than slack
+    tendon: float  # its force
+    tendon_slope: float  # over its normalized length
+    active: float  # force at rest, fully activated
+    active_slope: float  # over the normalized length
+    passive: float  # force
+    passive_slope: float  # over the normalized length
 
 
 def fibers_at(m: Thelen2003, path_length: float, length: float) -> Fibers:

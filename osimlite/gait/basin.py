@@ -28,36 +28,22 @@ Progress = Callable[[int, int], object]
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """One entry of the state that is changed.
+    """One entry of the state that is changed."""
 
-    Attributes:
-        label: what it is called, with its unit.
-        place: in the state.
-        values: (k,).
-    """
-
-    label: str
-    place: int
-    values: Floats
+    label: str  # what it is called, with its unit
+    place: int  # in the state
+    values: Floats  # (k,)
 
 
 @dataclass(frozen=True, eq=False)
 class Basin:
-    """How many steps walkers make from a grid of starts.
+    """How many steps walkers make from a grid of starts."""
 
-    Attributes:
-        x: what changes along the columns.
-        y: what changes along the rows.
-        steps: made before the fall, at most `wanted` (rows, columns).
-        wanted: as many steps count as walking.
-        center: values of x and y on the cycle.
-    """
-
-    x: Axis
-    y: Axis
-    steps: Ints
-    wanted: int
-    center: tuple[float, float]
+    x: Axis  # what changes along the columns
+    y: Axis  # what changes along the rows
+    steps: Ints  # made before the fall, at most `wanted` (rows, columns)
+    wanted: int  # as many steps count as walking
+    center: tuple[float, float]  # values of x and y on the cycle
 
     @property
     def part(self) -> float:

@@ -25,32 +25,21 @@ walker); with more, the map's curvature does (two parts in a thousand at 1e-4).
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """A walk that repeats itself with every step, or every stride if the legs differ.
+    """A walk that repeats itself with every step, or every stride if the legs differ."""
 
-    Attributes:
-        state: at the heel strike of the first foot, in the engine's order (y,).
-        length: of a step along the slope, from foot to foot, m.
-        way: of the walker in a step, along the slope; feet that roll while they stand take it further than `length`, m.
-        period: of a step, s.
-        multipliers: Floquet multipliers (of a step, or of a stride if the legs differ) without those of the neutral
-            directions, the largest first; that of the direction of the motion itself, zero, is among them.
-        neutral: how many directions are neutral.
-        residual: how far the map moves the state.
-        scuffs: in one step.
-        per_stride: whether the legs differ.
-        iterations: of Newton's method.
-    """
-
-    state: Floats
-    length: float
+    state: Floats  # at the heel strike of the first foot, in the engine's order (y,)
+    length: float  # of a step along the slope, from foot to foot, m
+    # of the walker in a step, along the slope; feet that roll while they stand take it further than `length`, m
     way: float
-    period: float
+    period: float  # of a step, s
+    # Floquet multipliers (of a step, or of a stride if the legs differ) without those of the neutral directions, the
+    # largest first; that of the direction of the motion itself, zero, is among them
     multipliers: NDArray[np.complex128]
-    neutral: int
-    residual: float
-    scuffs: int
-    per_stride: bool
-    iterations: int
+    neutral: int  # how many directions are neutral
+    residual: float  # how far the map moves the state
+    scuffs: int  # in one step
+    per_stride: bool  # whether the legs differ
+    iterations: int  # of Newton's method
 
     @property
     def speed(self) -> float:

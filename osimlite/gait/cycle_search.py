@@ -82,36 +82,22 @@ Progress = Callable[[float, float], object]
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A walker whose second step ended nearly as the first.
+    """A walker whose second step ended nearly as the first."""
 
-    Attributes:
-        fractions: where the numbers of its model lie in their ranges (k,).
-        state: at the end of the first step, written for the first foot (y,).
-        miss: by how much the second ended otherwise.
-    """
-
-    fractions: Floats
-    state: Floats
-    miss: float
+    fractions: Floats  # where the numbers of its model lie in their ranges (k,)
+    state: Floats  # at the end of the first step, written for the first foot (y,)
+    miss: float  # by how much the second ended otherwise
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A model with its cycle.
+    """A model with its cycle."""
 
-    Attributes:
-        fractions: where its numbers lie in their ranges (k,).
-        numbers: by the names of the variables.
-        cycle: that it walks in.
-        walking: which part of the walkers that start near it walk; 0 where nobody asked.
-        cost: the less, the better: the largest multiplier, and below what is stable enough, less by `walking`.
-    """
-
-    fractions: Floats
-    numbers: dict[str, float]
-    cycle: Cycle
-    walking: float
-    cost: float
+    fractions: Floats  # where its numbers lie in their ranges (k,)
+    numbers: dict[str, float]  # by the names of the variables
+    cycle: Cycle  # that it walks in
+    walking: float  # which part of the walkers that start near it walk; 0 where nobody asked
+    cost: float  # the less, the better: the largest multiplier, and below what is stable enough, less by `walking`
 
 
 class CycleSearch:

@@ -17,15 +17,10 @@ _OF_A_FOOT = re.compile(r"foot|feet|toe|heel|calc|sole|ball|hallux|met(a|\d)", r
 
 @dataclass(frozen=True)
 class FootContacts:
-    """The contacts of a walker with the ground.
+    """The contacts of a walker with the ground."""
 
-    Attributes:
-        feet: the contacts of each foot, by the names that the engine has for them.
-        falls: contacts that end the walk.
-    """
-
-    feet: tuple[tuple[str, ...], ...]
-    falls: tuple[str, ...]
+    feet: tuple[tuple[str, ...], ...]  # the contacts of each foot, by the names that the engine has for them
+    falls: tuple[str, ...]  # contacts that end the walk
 
     @property
     def foot_of(self) -> dict[str, int]:

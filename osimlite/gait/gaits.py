@@ -37,23 +37,14 @@ Stage = Callable[[str, float, float], object]
 
 @dataclass(frozen=True, eq=False)
 class Gait:
-    """A walker that was found.
+    """A walker that was found."""
 
-    Attributes:
-        found: its numbers and its cycle.
-        start: value and speed of each coordinate at the start, by name.
-        walk: from there.
-        candidates: how many of the random walkers made two steps.
-        cycles: how many cycles were found among them, and on the way to the most stable.
-        files: that were written.
-    """
-
-    found: Found
-    start: dict[str, tuple[float, float]]
-    walk: Walk
-    candidates: int
-    cycles: int
-    files: tuple[Path, ...]
+    found: Found  # its numbers and its cycle
+    start: dict[str, tuple[float, float]]  # value and speed of each coordinate at the start, by name
+    walk: Walk  # from there
+    candidates: int  # how many of the random walkers made two steps
+    cycles: int  # how many cycles were found among them, and on the way to the most stable
+    files: tuple[Path, ...]  # that were written
 
 
 def find_gait(

@@ -19,15 +19,10 @@ NUDGE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Carriers:
-    """The coordinates that carry a walker as a whole.
+    """The coordinates that carry a walker as a whole."""
 
-    Attributes:
-        places: of those that move every contact by the same way, in the state (m,).
-        lift: place of the one among them that lifts it off the ground, or None.
-    """
-
-    places: tuple[int, ...]
-    lift: int | None
+    places: tuple[int, ...]  # of those that move every contact by the same way, in the state (m,)
+    lift: int | None  # place of the one among them that lifts it off the ground, or None
 
 
 def carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:

@@ -51,19 +51,12 @@ def refuse_constraints(mechanism: Mechanism) -> None:
 
 @dataclass
 class Images:
-    """Where the step map takes W states.
+    """Where the step map takes W states."""
 
-    Attributes:
-        states: on the section (W, y); not a number where there was no step.
-        lengths: of the step, m (W,); of a stride of two steps, the mean.
-        times: that the step takes, s (W,); of a stride of two steps, the mean.
-        scuffs: how many there were on the way (W,).
-    """
-
-    states: Floats
-    lengths: Floats
-    times: Floats
-    scuffs: Ints
+    states: Floats  # on the section (W, y); not a number where there was no step
+    lengths: Floats  # of the step, m (W,); of a stride of two steps, the mean
+    times: Floats  # that the step takes, s (W,); of a stride of two steps, the mean
+    scuffs: Ints  # how many there were on the way (W,)
 
 
 class StepMap:

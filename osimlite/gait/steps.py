@@ -32,21 +32,13 @@ EVENTS_PER_SECOND = 60
 
 
 class Step(NamedTuple):
-    """One step.
+    """One step."""
 
-    Attributes:
-        time: of touch-down, s.
-        foot: that touches down.
-        length: how far ahead of the other foot, along the slope, m.
-        air: how long it was in the air, s.
-        state: at touch-down, in the engine's order (y,).
-    """
-
-    time: float
-    foot: int
-    length: float
-    air: float
-    state: Floats
+    time: float  # of touch-down, s
+    foot: int  # that touches down
+    length: float  # how far ahead of the other foot, along the slope, m
+    air: float  # how long it was in the air, s
+    state: Floats  # at touch-down, in the engine's order (y,)
 
 
 class Scuff(NamedTuple):
@@ -60,23 +52,14 @@ class Scuff(NamedTuple):
 
 @dataclass
 class Walk:
-    """What became of a walker.
+    """What became of a walker."""
 
-    Attributes:
-        end: when the walk or the simulation ended, s.
-        ending: "walking" if it was still on its feet, "fell", or why the simulation ended.
-        fell_on: contact that ended the walk.
-        steps: in the order of time.
-        scuffs: likewise.
-        distance: from the first touch-down of all to the last step, along the slope, m.
-    """
-
-    end: float = 0.0
-    ending: str = "walking"
-    fell_on: str = ""
-    steps: list[Step] = field(default_factory=list)
-    scuffs: list[Scuff] = field(default_factory=list)
-    distance: float = 0.0
+    end: float = 0.0  # when the walk or the simulation ended, s
+    ending: str = "walking"  # "walking" if it was still on its feet, "fell", or why the simulation ended
+    fell_on: str = ""  # contact that ended the walk
+    steps: list[Step] = field(default_factory=list)  # in the order of time
+    scuffs: list[Scuff] = field(default_factory=list)  # likewise
+    distance: float = 0.0  # from the first touch-down of all to the last step, along the slope, m
 
     @property
     def walks(self) -> bool:

@@ -54,21 +54,13 @@ class Pose(NamedTuple):
 
 
 class Wrapping(NamedTuple):
-    """A path around surfaces in OpenSim's way, beside the same along geodesics.
+    """A path around surfaces in OpenSim's way, beside the same along geodesics."""
 
-    Attributes:
-        owner: path of what has it.
-        surfaces: names of the surfaces.
-        default: by how much it is longer in the default pose, m; NaN if there is no geodesic.
-        worst: where that is most, m.
-        pose: there.
-    """
-
-    owner: str
-    surfaces: tuple[str, ...]
-    default: float
-    worst: float
-    pose: Pose
+    owner: str  # path of what has it
+    surfaces: tuple[str, ...]  # names of the surfaces
+    default: float  # by how much it is longer in the default pose, m; NaN if there is no geodesic
+    worst: float  # where that is most, m
+    pose: Pose  # there
 
 
 class Jump(NamedTuple):
@@ -90,55 +82,33 @@ class LengthOnSurface(NamedTuple):
 
 
 class MovingPoint(NamedTuple):
-    """A moving point at an end of its coordinate's range.
+    """A moving point at an end of its coordinate's range."""
 
-    Attributes:
-        owner: path of what has the point.
-        point: its name.
-        end: of the range.
-        beyond: by how much the coordinate is outside what the functions are given for there (rad or m), 0 if inside.
-        moved: how far they let the point move on that way, m.
-        rate: of the place over the coordinate that OpenSim goes on with outside the range, m/rad or 1.
-    """
-
-    owner: str
-    point: str
-    end: Value
+    owner: str  # path of what has the point
+    point: str  # its name
+    end: Value  # of the range
+    # by how much the coordinate is outside what the functions are given for there (rad or m), 0 if inside
     beyond: float
-    moved: float
-    rate: float
+    moved: float  # how far they let the point move on that way, m
+    rate: float  # of the place over the coordinate that OpenSim goes on with outside the range, m/rad or 1
 
 
 class Start(NamedTuple):
-    """A muscle in the state that it starts with, and in equilibrium at the same activation, in the default pose.
+    """A muscle in the state that it starts with, and in equilibrium at the same activation, in the default pose."""
 
-    Attributes:
-        owner: its path.
-        lengths: of the fibers, in optimal fiber lengths; in equilibrium NaN if there is none.
-        tensions: of the tendon, in max_isometric_force.
-    """
-
-    owner: str
-    lengths: tuple[float, float]
-    tensions: tuple[float, float]
+    owner: str  # its path
+    lengths: tuple[float, float]  # of the fibers, in optimal fiber lengths; in equilibrium NaN if there is none
+    tensions: tuple[float, float]  # of the tendon, in max_isometric_force
 
 
 class Reach(NamedTuple):
-    """The fibers of a muscle in equilibrium, fully active where its path is shortest, at rest where it is longest.
+    """The fibers of a muscle in equilibrium, fully active where its path is shortest, at rest where it is longest."""
 
-    Attributes:
-        owner: path of the muscle.
-        is_active: whether they are.
-        pose: where.
-        length: of the fibers, in optimal fiber lengths.
-        is_limit: whether that is the least that its curves and its pennation allow.
-    """
-
-    owner: str
-    is_active: bool
-    pose: Pose
-    length: float
-    is_limit: bool
+    owner: str  # path of the muscle
+    is_active: bool  # whether they are
+    pose: Pose  # where
+    length: float  # of the fibers, in optimal fiber lengths
+    is_limit: bool  # whether that is the least that its curves and its pennation allow
 
 
 class Measures(NamedTuple):

@@ -28,15 +28,10 @@ _ASIDE = {"Geometry", "Marker", "Controller", "Probe", "ContactGeometry"}
 
 
 class Parts(NamedTuple):
-    """Digests of the parts of a text.
+    """Digests of the parts of a text."""
 
-    Attributes:
-        rest: of all that paths move with.
-        paths: of the element of each path's owner, by its path.
-    """
-
-    rest: str
-    paths: dict[str, str]
+    rest: str  # of all that paths move with
+    paths: dict[str, str]  # of the element of each path's owner, by its path
 
 
 class Known(NamedTuple):

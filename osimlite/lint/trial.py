@@ -39,63 +39,35 @@ KINDS = {"peak": "the peak of "} | dict.fromkeys(("rms", "rms-translation"), "th
 
 
 class Number(NamedTuple):
-    """Something that was measured of a trial.
+    """Something that was measured of a trial."""
 
-    Attributes:
-        rule: name of the rule that judges it.
-        kind: what it is of a column of numbers: one of `KINDS`, or "".
-        of: what was measured, in words.
-        value: in the `unit`.
-        unit: N, N m, cm, deg, % or "".
-        scale: what a limit may be a part of, in the `unit`; NaN if that is not known.
-        where: at which time, of which marker, in words.
-        at: where that is in the file.
-        is_final: whether the trial goes on with it; else it is worth no more than an info.
-        side: what else is known, in words.
-    """
-
-    rule: str
-    kind: str
-    of: str
-    value: float
-    unit: str
-    scale: float = nan
-    where: str = ""
-    at: Position | None = None
-    is_final: bool = True
-    side: str = ""
+    rule: str  # name of the rule that judges it
+    kind: str  # what it is of a column of numbers: one of `KINDS`, or ""
+    of: str  # what was measured, in words
+    value: float  # in the `unit`
+    unit: str  # N, N m, cm, deg, % or ""
+    scale: float = nan  # what a limit may be a part of, in the `unit`; NaN if that is not known
+    where: str = ""  # at which time, of which marker, in words
+    at: Position | None = None  # where that is in the file
+    is_final: bool = True  # whether the trial goes on with it; else it is worth no more than an info
+    side: str = ""  # what else is known, in words
 
 
 class Verdict(NamedTuple):
-    """A number with its limits.
+    """A number with its limits."""
 
-    Attributes:
-        code: of the rule.
-        name: of the rule.
-        of: what was measured, in words.
-        value: in the `unit`.
-        unit: N, N m, cm, deg, % or "".
-        good: up to which it is good.
-        bad: from which on it is bad.
-        verdict: one of `VERDICTS`.
-        source: of the limits.
-        where: at which time, of which marker, in words.
-        file: that it was measured of.
-        line: of the file, counted from 1.
-    """
-
-    code: str
-    name: str
-    of: str
-    value: float
-    unit: str
-    good: float
-    bad: float
-    verdict: str
-    source: str
-    where: str
-    file: str
-    line: int | None
+    code: str  # of the rule
+    name: str  # of the rule
+    of: str  # what was measured, in words
+    value: float  # in the `unit`
+    unit: str  # N, N m, cm, deg, % or ""
+    good: float  # up to which it is good
+    bad: float  # from which on it is bad
+    verdict: str  # one of `VERDICTS`
+    source: str  # of the limits
+    where: str  # at which time, of which marker, in words
+    file: str  # that it was measured of
+    line: int | None  # of the file, counted from 1
 
     @property
     def shown(self) -> str:

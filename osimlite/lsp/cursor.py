@@ -24,45 +24,27 @@ _WORD = re.compile(r"[^\s<>]*")
 
 
 class Element(NamedTuple):
-    """An element around a place.
+    """An element around a place."""
 
-    Attributes:
-        tag: its name.
-        start: offset of its ``<``.
-        number: in document order, as the reader counts.
-        given: its attribute `name`.
-        cls: the class of the object it is; None for a property, and for what is not known.
-        spec: the property it is, or that holds it; None for what is not known.
-    """
-
-    tag: str
-    start: int
-    number: int
-    given: str
-    cls: type[Object] | None
-    spec: FieldSpec | None
+    tag: str  # its name
+    start: int  # offset of its `<`
+    number: int  # in document order, as the reader counts
+    given: str  # its attribute `name`
+    cls: type[Object] | None  # the class of the object it is; None for a property, and for what is not known
+    spec: FieldSpec | None  # the property it is, or that holds it; None for what is not known
 
 
 class Cursor(NamedTuple):
-    """What stands at a place.
+    """What stands at a place."""
 
-    Attributes:
-        kind: of what.
-        around: the elements around it, outermost first; for a tag, the element itself is not among them.
-        start: offset of the beginning of the word there: a tag, an attribute's value, a word of a text.
-        end: and behind its end.
-        word: that word; of a tag only its name.
-        attribute: the name of the attribute whose value it is.
-        element: for a tag and an attribute, the element they belong to.
-    """
-
-    kind: Kind
+    kind: Kind  # of what
+    # the elements around it, outermost first; for a tag, the element itself is not among them
     around: tuple[Element, ...]
-    start: int
-    end: int
-    word: str
-    attribute: str = ""
-    element: Element | None = None
+    start: int  # offset of the beginning of the word there: a tag, an attribute's value, a word of a text
+    end: int  # and behind its end
+    word: str  # that word; of a tag only its name
+    attribute: str = ""  # the name of the attribute whose value it is
+    element: Element | None = None  # for a tag and an attribute, the element they belong to
 
     @property
     def inner(self) -> Element | None:

@@ -23,23 +23,15 @@ their range and go 1e-5 after it, are all there or gone then."""
 
 
 class Suspect(NamedTuple):
-    """An interval of a sweep in which the length of a path may jump.
+    """An interval of a sweep in which the length of a path may jump."""
 
-    Attributes:
-        excess: by how much the length changes otherwise than next to the interval, m; infinite at a conditional point.
-        usual: the change next to it, m.
-        sweep: of a coordinate.
-        path: number of the path.
-        pose: number of the pose before the interval.
-        ends: of the interval.
-    """
-
+    # by how much the length changes otherwise than next to the interval, m; infinite at a conditional point
     excess: float
-    usual: float
-    sweep: Sweep
-    path: int
-    pose: int
-    ends: tuple[float, float]
+    usual: float  # the change next to it, m
+    sweep: Sweep  # of a coordinate
+    path: int  # number of the path
+    pose: int  # number of the pose before the interval
+    ends: tuple[float, float]  # of the interval
 
 
 def jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[Jump]:

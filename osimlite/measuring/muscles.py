@@ -26,19 +26,12 @@ REST = 0.01
 
 
 class Fibers(NamedTuple):
-    """A muscle with its law, which is called as Python: some hundred times, where compiling it would take longer.
+    """A muscle with its law, which is called as Python: some hundred times, where compiling it would take longer."""
 
-    Attributes:
-        path: of the muscle.
-        kind: of the muscle.
-        component: the muscle.
-        values: of the parameters of the law, but for the control.
-    """
-
-    path: str
-    kind: Kind
-    component: Any
-    values: tuple[Any, ...]
+    path: str  # of the muscle
+    kind: Kind  # of the muscle
+    component: Any  # the muscle
+    values: tuple[Any, ...]  # of the parameters of the law, but for the control
 
     @property
     def is_elastic(self) -> bool:

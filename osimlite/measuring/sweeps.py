@@ -28,21 +28,13 @@ STILL = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """A coordinate over its range, the others as in the default pose, or as near to it as constraints let them be.
+    """A coordinate over its range, the others as in the default pose, or as near to it as constraints let them be."""
 
-    Attributes:
-        paths: whose lengths change.
-        place: of the coordinate in the mechanism.
-        poses: values of all coordinates (k, n), those of this one increasing; as far as constraints allow.
-        is_tied: whether a constraint moves others with the coordinate.
-        lengths: of all paths there (k, p), m.
-    """
-
-    paths: Paths
-    place: int
-    poses: Array
-    is_tied: bool
-    lengths: Array
+    paths: Paths  # whose lengths change
+    place: int  # of the coordinate in the mechanism
+    poses: Array  # values of all coordinates (k, n), those of this one increasing; as far as constraints allow
+    is_tied: bool  # whether a constraint moves others with the coordinate
+    lengths: Array  # of all paths there (k, p), m
 
     @property
     def values(self) -> Array:

@@ -16,15 +16,10 @@ class OutsideError(OsimliteError):
 
 @dataclass(frozen=True)
 class MeshFolders:
-    """Where the mesh files of a model may be.
+    """Where the mesh files of a model may be."""
 
-    Attributes:
-        beside: the folder of the model's file; None if it has none.
-        named: folders that the user names; those in the environment variable follow them.
-    """
-
-    beside: Path | None = None
-    named: Sequence[str | Path] = ()
+    beside: Path | None = None  # the folder of the model's file; None if it has none
+    named: Sequence[str | Path] = ()  # folders that the user names; those in the environment variable follow them
 
     @property
     def searched(self) -> tuple[Path, ...]:

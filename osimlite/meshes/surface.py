@@ -15,32 +15,20 @@ Indices = NDArray[np.int64]
 
 
 class Polygons(NamedTuple):
-    """Polygons of any number of corners.
+    """Polygons of any number of corners."""
 
-    Attributes:
-        points: (n, 3).
-        corners: of all polygons, one after the other (places of points), counter-clockwise seen from outside.
-        ends: where each polygon ends in `corners`, increasing.
-    """
-
-    points: Array
-    corners: Indices
-    ends: Indices
+    points: Array  # (n, 3)
+    corners: Indices  # of all polygons, one after the other (places of points), counter-clockwise seen from outside
+    ends: Indices  # where each polygon ends in `corners`, increasing
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A surface of triangles.
+    """A surface of triangles."""
 
-    Attributes:
-        points: (n, 3).
-        triangles: (t, 3) places of points, counter-clockwise seen from outside.
-        normals: outward unit vectors at the points (n, 3), or None.
-    """
-
-    points: Array
-    triangles: Indices
-    normals: Array | None = None
+    points: Array  # (n, 3)
+    triangles: Indices  # (t, 3) places of points, counter-clockwise seen from outside
+    normals: Array | None = None  # outward unit vectors at the points (n, 3), or None
 
     def stretched(self, factors: Sequence[float]) -> Surface:
         """The surface with its coordinates multiplied by `factors` (3,), and its outside still outside."""

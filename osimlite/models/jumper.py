@@ -43,27 +43,16 @@ PELVIS_TILT, PELVIS_HEIGHT = -40.0, 0.6599952
 
 
 class Muscle(NamedTuple):
-    """A muscle of each leg.
+    """A muscle of each leg."""
 
-    Attributes:
-        force: maximum isometric (N).
-        fiber: optimal length (m).
-        tendon: slack length (m).
-        pennation: at optimal fiber length (deg).
-        path: body, forward and up (m) of each point.
-        wrap: the cylinder that the path bends around.
-        activation: with which all are in balance in the squat.
-        length: of the fibers there (m).
-    """
-
-    force: float
-    fiber: float
-    tendon: float
-    pennation: float
-    path: tuple[tuple[str, float, float], ...]
-    wrap: str
-    activation: float
-    length: float
+    force: float  # maximum isometric (N)
+    fiber: float  # optimal length (m)
+    tendon: float  # slack length (m)
+    pennation: float  # at optimal fiber length (deg)
+    path: tuple[tuple[str, float, float], ...]  # body, forward and up (m) of each point
+    wrap: str  # the cylinder that the path bends around
+    activation: float  # with which all are in balance in the squat
+    length: float  # of the fibers there (m)
 
 
 MUSCLES = {

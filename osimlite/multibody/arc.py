@@ -22,16 +22,11 @@ class ArcPoint(Function):
 
     The rod stands along Y; its end points along the Y axis that is turned first about X by one angle, then about the
     new Z by the other. Bent by θ in all, it is an arc of radius length / θ.
-
-    Attributes:
-        component: 0 to 2.
-        length: m.
-        neutral: what is added to the two arguments (rad).
     """
 
-    component: int
-    length: float
-    neutral: tuple[float, float]
+    component: int  # 0 to 2
+    length: float  # m
+    neutral: tuple[float, float]  # what is added to the two arguments (rad)
 
     def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
         """Value, gradient (2,) and Hessian (2, 2) at the two angles."""

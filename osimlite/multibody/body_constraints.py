@@ -153,17 +153,11 @@ class DistanceConstraint(_Between[StationPlacement]):
 
 @dataclass(frozen=True, eq=False)
 class PointOnLineConstraint(Bonded):
-    """Keeps a station of the follower on a line fixed in a body.
+    """Keeps a station of the follower on a line fixed in a body."""
 
-    Attributes:
-        line: a point of the line.
-        along: direction (3,) of the line in the frame of its body.
-        follower: the station on the line.
-    """
-
-    line: StationPlacement
-    along: Array
-    follower: StationPlacement
+    line: StationPlacement  # a point of the line
+    along: Array  # direction (3,) of the line in the frame of its body
+    follower: StationPlacement  # the station on the line
     name: str = "point on line constraint"
 
     @property

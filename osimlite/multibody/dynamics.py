@@ -43,22 +43,14 @@ class Wrench(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MassCentres:
-    """The b bodies of a mechanism at one state, seen from their mass centres, along ground's axes.
-
-    Attributes:
-        masses: (b,), kg.
-        inertias: about the mass centres (b, 3, 3), kg·m².
-        arms: from the body origins to the mass centres (b, 3), m.
-        turning: from the n speeds to the angular velocities (b, 3, n).
-        moving: from the n speeds to the velocities of the mass centres (b, 3, n).
-    """
+    """The b bodies of a mechanism at one state, seen from their mass centres, along ground's axes."""
 
     state: Kinematics
-    masses: Array
-    inertias: Array
-    arms: Array
-    turning: Array
-    moving: Array
+    masses: Array  # (b,), kg
+    inertias: Array  # about the mass centres (b, 3, 3), kg·m²
+    arms: Array  # from the body origins to the mass centres (b, 3), m
+    turning: Array  # from the n speeds to the angular velocities (b, 3, n)
+    moving: Array  # from the n speeds to the velocities of the mass centres (b, 3, n)
 
     @classmethod
     def of(cls, state: Kinematics) -> MassCentres:

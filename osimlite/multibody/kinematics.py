@@ -21,28 +21,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Kinematics:
-    """A mechanism of b bodies and n coordinates at one state.
-
-    Attributes:
-        q: coordinate values (n,).
-        u: generalized speeds (n,).
-        rotations: of each body in ground (b + 1, 3, 3).
-        origins: of each body in ground (b + 1, 3), m.
-        jacobians: from the n speeds to the velocity of each body (b + 1, 6, n).
-        velocities: of each body in ground (b + 1, 6).
-        biases: the accelerations (b + 1, 6) that the bodies have while all udot are zero.
-        time: what prescribed motions go by (s).
-    """
+    """A mechanism of b bodies and n coordinates at one state."""
 
     mechanism: Mechanism
-    q: Array
-    u: Array
-    rotations: Array
-    origins: Array
-    jacobians: Array
-    velocities: Array
-    biases: Array
-    time: float = 0.0
+    q: Array  # coordinate values (n,)
+    u: Array  # generalized speeds (n,)
+    rotations: Array  # of each body in ground (b + 1, 3, 3)
+    origins: Array  # of each body in ground (b + 1, 3), m
+    jacobians: Array  # from the n speeds to the velocity of each body (b + 1, 6, n)
+    velocities: Array  # of each body in ground (b + 1, 6)
+    biases: Array  # the accelerations (b + 1, 6) that the bodies have while all udot are zero
+    time: float = 0.0  # what prescribed motions go by (s)
 
     def transform(self, body: int) -> Array:
         """The body in ground (4, 4)."""

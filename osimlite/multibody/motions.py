@@ -168,14 +168,10 @@ class SimbodyAccelerationError(Motion):
 
 @dataclass(frozen=True, eq=False)
 class AccelerationErrorAngle(Function):
-    """An angle that is zero with a rate of zero; its second derivative is a component of a `SimbodyAccelerationError`.
-
-    Attributes:
-        places: of its arguments among the coordinates of the joint.
-    """
+    """An angle of zero with a rate of zero; its second derivative is a component of a `SimbodyAccelerationError`."""
 
     drift: SimbodyAccelerationError
-    places: tuple[int, ...]
+    places: tuple[int, ...]  # of its arguments among the coordinates of the joint
     component: int
 
     def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:

@@ -23,19 +23,12 @@ from osimlite.text import listed
 
 @dataclass(frozen=True, eq=False)
 class ConstraintReader:
-    """Makes constraints of a mechanism from those of a model.
+    """Makes constraints of a mechanism from those of a model."""
 
-    Attributes:
-        placements: of the model's frames.
-        bodies: index in the mechanism of every body and ground, by absolute path.
-        coordinates: index in the mechanism of every coordinate, by absolute path.
-        opensim_derivatives: see :func:`osimlite.multibody.build.build_mechanism`.
-    """
-
-    placements: Placements
-    bodies: Mapping[str, int]
-    coordinates: Mapping[str, int]
-    opensim_derivatives: bool
+    placements: Placements  # of the model's frames
+    bodies: Mapping[str, int]  # index in the mechanism of every body and ground, by absolute path
+    coordinates: Mapping[str, int]  # index in the mechanism of every coordinate, by absolute path
+    opensim_derivatives: bool  # see `build_mechanism`
 
     def constraint(self, constraint: SchemaConstraint) -> Constraint:
         """The equations of an enforced constraint.

@@ -28,32 +28,20 @@ class MeshProblem(Exception):
 
 @dataclass(frozen=True, slots=True)
 class MeshCopy:
-    """A mesh file of the robot.
+    """A mesh file of the robot."""
 
-    Attributes:
-        file: relative to the robot's own file.
-        source: where it was found.
-        converted: what was done to it, or "".
-        misspelt: whether its name has other capitals or slashes than the model says.
-    """
-
-    file: str
-    source: Path
-    converted: str
-    misspelt: bool
+    file: str  # relative to the robot's own file
+    source: Path  # where it was found
+    converted: str  # what was done to it, or ""
+    misspelt: bool  # whether its name has other capitals or slashes than the model says
 
 
 @dataclass
 class MeshFiles:
-    """Mesh files for a robot, each once, and each written from what was read of it.
+    """Mesh files for a robot, each once, and each written from what was read of it."""
 
-    Attributes:
-        folders: where files may be.
-        files: contents by name relative to the robot's own file.
-    """
-
-    folders: MeshFolders = field(default_factory=MeshFolders)
-    files: dict[str, bytes] = field(default_factory=dict)
+    folders: MeshFolders = field(default_factory=MeshFolders)  # where files may be
+    files: dict[str, bytes] = field(default_factory=dict)  # contents by name relative to the robot's own file
     _made: dict[tuple[object, ...], str] = field(default_factory=dict)
 
     def copy(self, name: str, signs: Signs = (1.0, 1.0, 1.0)) -> MeshCopy:

@@ -34,24 +34,16 @@ JointKind = Literal["fixed", "revolute", "prismatic"]
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A rigid body of the robot.
+    """A rigid body of the robot."""
 
-    Attributes:
-        name: unique among links and joints.
-        mass: kg; 0 for a link that only stands between two joints.
-        center: mass centre (3,) in the link frame, m.
-        inertia: (3, 3) about the mass centre along the axes of the link frame, kg·m².
-        visuals: what it looks like.
-        collisions: what it touches others with; their colours mean nothing.
-        bodies: frame (4, 4) in the link frame of each body it carries, by the body's absolute path.
-    """
-
-    name: str
-    mass: float = 0.0
-    center: Array = field(default_factory=lambda: np.zeros(3))
+    name: str  # unique among links and joints
+    mass: float = 0.0  # kg; 0 for a link that only stands between two joints
+    center: Array = field(default_factory=lambda: np.zeros(3))  # mass centre (3,) in the link frame, m
+    # (3, 3) about the mass centre along the axes of the link frame, kg·m²
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
-    visuals: tuple[Visual, ...] = ()
-    collisions: tuple[Visual, ...] = ()
+    visuals: tuple[Visual, ...] = ()  # what it looks like
+    collisions: tuple[Visual, ...] = ()  # what it touches others with; their colours mean nothing
+    # frame (4, 4) in the link frame of each body it carries, by the body's absolute path
     bodies: Mapping[str, Array] = field(default_factory=dict)
 
 
@@ -61,34 +53,21 @@ class RobotJoint:
 
     The child link's frame in the parent link's frame is `origin`, then the motion by the joint's value along or about
     `axis`.
-
-    Attributes:
-        name: unique among links and joints.
-        kind: how it moves.
-        parent: name of the link it starts from.
-        child: name of the link it moves.
-        origin: (4, 4), the joint in the parent link.
-        axis: unit vector (3,) in the joint's frame.
-        coordinates: places in the mechanism of the coordinates that decide the value; empty for a fixed joint.
-        function: the joint's value (rad, m) as a function of these coordinates.
-        limits: hard limits of the value, or None.
-        effort: greatest force (N, N·m) that a program may put on it, or None.
-        velocity: greatest rate (m/s, rad/s) that a program may ask of it, or None.
-        source: absolute path of the model's joint that it is a part of.
     """
 
-    name: str
-    kind: JointKind
-    parent: str
-    child: str
-    origin: Array
-    axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))
+    name: str  # unique among links and joints
+    kind: JointKind  # how it moves
+    parent: str  # name of the link it starts from
+    child: str  # name of the link it moves
+    origin: Array  # (4, 4), the joint in the parent link
+    axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))  # unit vector (3,) in the joint's frame
+    # places in the mechanism of the coordinates that decide the value; empty for a fixed joint
     coordinates: tuple[int, ...] = ()
-    function: Function = IDENTITY
-    limits: tuple[float, float] | None = None
-    effort: float | None = None
-    velocity: float | None = None
-    source: str = ""
+    function: Function = IDENTITY  # the joint's value (rad, m) as a function of these coordinates
+    limits: tuple[float, float] | None = None  # hard limits of the value, or None
+    effort: float | None = None  # greatest force (N, N·m) that a program may put on it, or None
+    velocity: float | None = None  # greatest rate (m/s, rad/s) that a program may ask of it, or None
+    source: str = ""  # absolute path of the model's joint that it is a part of
 
     @property
     def coordinate(self) -> int | None:

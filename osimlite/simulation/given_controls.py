@@ -26,15 +26,10 @@ from osimlite.text import did_you_mean, listed
 
 @dataclass(frozen=True)
 class Called(Univariate):
-    """A function of Python that gives a control for a time (s).
+    """A function of Python that gives a control for a time (s)."""
 
-    Attributes:
-        function: it.
-        name: of the control, for messages.
-    """
-
-    function: Callable[[float], float]
-    name: str
+    function: Callable[[float], float]  # it
+    name: str  # of the control, for messages
 
     def _at(self, x: float) -> tuple[float, float, float]:
         value = float(self.function(x))

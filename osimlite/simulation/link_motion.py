@@ -56,15 +56,10 @@ def stations(system: System, moments: Moments, body: int, location: Floats) -> F
 
 @dataclass(frozen=True, eq=False)
 class LinkMotion:
-    """The motion of links at t moments, and of the bodies that are fixed to them; all along the axes of ground.
+    """The motion of links at t moments, and of the bodies that are fixed to them; all along the axes of ground."""
 
-    Attributes:
-        system: whose links.
-        links: what the kernels find of them in motion (t, l, n).
-    """
-
-    system: System
-    links: Floats
+    system: System  # whose links
+    links: Floats  # what the kernels find of them in motion (t, l, n)
 
     @classmethod
     def of(cls, system: System, moments: Floats, accelerations: Floats) -> LinkMotion:

@@ -38,31 +38,18 @@ steps as were allowed."""
 
 @dataclass(frozen=True, kw_only=True)
 class BatchOptions:
-    """How the runs of a batch go.
+    """How the runs of a batch go."""
 
-    Attributes:
-        to: when they end unless a watch stops them, s.
-        accuracy: of the integrator.
-        integrator: see :class:`osimlite.simulation.Options`.
-        report_times: at which states are kept, increasing, s.
-        watches: what else is an event, besides contacts that begin and end.
-        most_events: room for the events of a run; those beyond it are lost.
-        event_states: keep the states at the events.
-        most_tries: steps that a run may try.
-        threads: how many work; by default one for each core.
-        step_bounds: of the steps, see :class:`osimlite.simulation.engines.protocol.Settings`.
-    """
-
-    to: float = 2.0
-    accuracy: float = DEFAULT_ACCURACY
-    integrator: str = MERSON
-    report_times: Sequence[float] = ()
-    watches: Sequence[Watch] = ()
-    most_events: int = 0
-    event_states: bool = False
-    most_tries: int = NO_LIMIT
-    threads: int | None = None
-    step_bounds: tuple[float, float] = NO_BOUNDS
+    to: float = 2.0  # when they end unless a watch stops them, s
+    accuracy: float = DEFAULT_ACCURACY  # of the integrator
+    integrator: str = MERSON  # see `Options`
+    report_times: Sequence[float] = ()  # at which states are kept, increasing, s
+    watches: Sequence[Watch] = ()  # what else is an event, besides contacts that begin and end
+    most_events: int = 0  # room for the events of a run; those beyond it are lost
+    event_states: bool = False  # keep the states at the events
+    most_tries: int = NO_LIMIT  # steps that a run may try
+    threads: int | None = None  # how many work; by default one for each core
+    step_bounds: tuple[float, float] = NO_BOUNDS  # of the steps, see `Settings`
 
     def check(self) -> None:
         """SettingError for what has no meaning; machine code might go on with it forever."""
@@ -83,19 +70,12 @@ class BatchOptions:
 
 
 class BatchEngine(Engine, Protocol):
-    """An engine that computes many motions at once.
+    """An engine that computes many motions at once."""
 
-    Attributes:
-        mechanism: of the model.
-        forces: of the model.
-        structure: what is connected to what, integers; equal for models that differ in numbers only.
-        numbers: all numbers of the model (m,).
-    """
-
-    mechanism: Mechanism
-    forces: Forces
-    structure: Ints
-    numbers: Floats
+    mechanism: Mechanism  # of the model
+    forces: Forces  # of the model
+    structure: Ints  # what is connected to what, integers; equal for models that differ in numbers only
+    numbers: Floats  # all numbers of the model (m,)
 
     def run_many(self, states: ArrayLike, options: BatchOptions, numbers: ArrayLike | None = None) -> Runs:
         """Compute a batch; see :func:`run_many`."""
@@ -128,19 +108,12 @@ class BatchEngine(Engine, Protocol):
 
 @dataclass(frozen=True)
 class Renewed:
-    """A model of which only numbers have changed.
+    """A model of which only numbers have changed."""
 
-    Attributes:
-        mechanism: of it.
-        forces: of it.
-        numbers: as `BatchEngine.numbers` (m,).
-        given: engine of the model before.
-    """
-
-    mechanism: Mechanism
-    forces: Forces
-    numbers: Floats
-    given: Any
+    mechanism: Mechanism  # of it
+    forces: Forces  # of it
+    numbers: Floats  # as `BatchEngine.numbers` (m,)
+    given: Any  # engine of the model before
 
     def engine(self) -> Any:
         """The engine of this very model."""

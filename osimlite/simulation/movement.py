@@ -14,17 +14,11 @@ from osimlite.simulation.tabular import Tabular
 
 
 class Movement(Tabular):
-    """A motion of a mechanism.
+    """A motion of a mechanism."""
 
-    Attributes:
-        mechanism: what moves.
-        times: (t,), s.
-        values: of all n coordinates (t, n), in the mechanism's order, rad and m.
-    """
-
-    mechanism: Mechanism
-    times: Array
-    values: Array
+    mechanism: Mechanism  # what moves
+    times: Array  # (t,), s
+    values: Array  # of all n coordinates (t, n), in the mechanism's order, rad and m
 
     @property
     def coordinates(self) -> tuple[str, ...]:

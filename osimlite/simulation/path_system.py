@@ -27,15 +27,10 @@ ALL = -1
 
 @dataclass(frozen=True)
 class MeasuredPath(Silent):
-    """A path as an element that is measured and does not pull.
+    """A path as an element that is measured and does not pull."""
 
-    Attributes:
-        path: of its owner.
-        along: the path itself.
-    """
-
-    path: str
-    along: Along
+    path: str  # of its owner
+    along: Along  # the path itself
     states: tuple[StateVariable, ...] = ()
 
     @property
@@ -54,20 +49,13 @@ class MeasuredPath(Silent):
 
 
 class _OnSurface(NamedTuple):
-    """Where the work vector says how long a path is on one of its surfaces.
+    """Where the work vector says how long a path is on one of its surfaces."""
 
-    Attributes:
-        path: of the owner.
-        surface: its name.
-        node: number of the second tangent point.
-        order: places of the number of nodes, and of the nodes in their order.
-        length: place of the length before that node, and what the law of the surface says of a piece; -1 without one.
-    """
-
-    path: str
-    surface: str
-    node: int
-    order: tuple[int, ...]
+    path: str  # of the owner
+    surface: str  # its name
+    node: int  # number of the second tangent point
+    order: tuple[int, ...]  # places of the number of nodes, and of the nodes in their order
+    # place of the length before that node, and what the law of the surface says of a piece; -1 without one
     length: tuple[int, int]
 
 

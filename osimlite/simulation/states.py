@@ -26,19 +26,12 @@ Start = float | Callable[[Sequence[float], Sequence[float]], float]
 
 @dataclass(frozen=True)
 class StateVariable:
-    """An auxiliary state of a force element.
+    """An auxiliary state of a force element."""
 
-    Attributes:
-        path: as OpenSim has it.
-        start: where it starts.
-        is_simbody: whether Simbody keeps it, in OpenSim: such states stand behind all others.
-        is_named: whether OpenSim has a name for it, so that it is in files of states.
-    """
-
-    path: str
-    start: Start = 0.0
-    is_simbody: bool = False
-    is_named: bool = True
+    path: str  # as OpenSim has it
+    start: Start = 0.0  # where it starts
+    is_simbody: bool = False  # whether Simbody keeps it, in OpenSim: such states stand behind all others
+    is_named: bool = True  # whether OpenSim has a name for it, so that it is in files of states
 
 
 def in_model_order(model: Model, paths: Sequence[str]) -> list[str]:

@@ -68,25 +68,16 @@ def ideal(actuator: ScalarActuator, optimal_force: float) -> ScalarActuator | No
 
 @dataclass(frozen=True, eq=False)
 class Shared:
-    """How the generalized forces of a motion are shared.
+    """How the generalized forces of a motion are shared."""
 
-    Attributes:
-        times: (t,), s.
-        names: of the actuators (a,).
-        activations: of all actuators (t, a); NaN at a time at which there is no solution.
-        strengths: what each pushes with at an activation of 1 (t, a), N or N m.
-        coordinates: that the actuators are to accelerate (m,).
-        lacking: generalized forces that cannot be given (t, m), N or N m; the least ones, at times without a solution.
-        solved: at which times there is a solution (t,).
-    """
-
-    times: Array
-    names: tuple[str, ...]
-    activations: Array
-    strengths: Array
-    coordinates: tuple[str, ...]
+    times: Array  # (t,), s
+    names: tuple[str, ...]  # of the actuators (a,)
+    activations: Array  # of all actuators (t, a); NaN at a time at which there is no solution
+    strengths: Array  # what each pushes with at an activation of 1 (t, a), N or N m
+    coordinates: tuple[str, ...]  # that the actuators are to accelerate (m,)
+    # generalized forces that cannot be given (t, m), N or N m; the least ones, at times without a solution
     lacking: Array
-    solved: NDArray[np.bool_]
+    solved: NDArray[np.bool_]  # at which times there is a solution (t,)
 
     @property
     def forces(self) -> Array:

@@ -223,16 +223,10 @@ class Interrupted(KeyboardInterrupt):
 
 
 class Report(NamedTuple):
-    """How a trajectory gets what it works out later.
+    """How a trajectory gets what it works out later."""
 
-    Attributes:
-        forces: labels, and one row for each moment.
-        energies: kinetic energy, potential energy of gravity and stored energy at each moment, J.
-        probes: labels, and one row for each moment.
-        summary: what goes into summary.json.
-    """
-
-    forces: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]
+    forces: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]  # labels, and one row for each moment
+    # kinetic energy, potential energy of gravity and stored energy at each moment, J
     energies: Callable[[], Sequence[Sequence[float]]]
-    probes: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]
-    summary: Callable[[], dict[str, Any]]
+    probes: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]  # labels, and one row for each moment
+    summary: Callable[[], dict[str, Any]]  # what goes into summary.json

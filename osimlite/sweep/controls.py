@@ -51,17 +51,11 @@ Values = Sequence[float]
 
 @dataclass(frozen=True)
 class Control:
-    """A number that several controls depend on.
+    """A number that several controls depend on."""
 
-    Attributes:
-        actuators: paths of those that are controlled.
-        kind: `OFFSET`, `NODE`, `SWITCH` or `SCALE`.
-        at: time of a node (s), or number of a switch.
-    """
-
-    actuators: tuple[str, ...]
-    kind: str = OFFSET
-    at: float = 0.0
+    actuators: tuple[str, ...]  # paths of those that are controlled
+    kind: str = OFFSET  # `OFFSET`, `NODE`, `SWITCH` or `SCALE`
+    at: float = 0.0  # time of a node (s), or number of a switch
 
     @property
     def parts(self) -> tuple[Control, ...]:

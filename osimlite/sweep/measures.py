@@ -30,29 +30,17 @@ from osimlite.text import did_you_mean, or_known
 
 @dataclass(frozen=True)
 class Batch:
-    """Runs of models of one structure.
+    """Runs of models of one structure."""
 
-    Attributes:
-        engine: of a model of the same structure.
-        engine_of: the engine of the model of a run, by its place.
-        numbers: of the compiled engines (W, m); None if all are those of `engine`.
-        starts: initial states (W, y), in the engine's order.
-        runs: what came of them.
-        values: of the variables (W, d).
-        names: of the variables.
-        report_times: at which states were kept, s.
-        memory: where measures leave for each other what they have found.
-    """
-
-    engine: Any
-    engine_of: Callable[[int], Any]
-    numbers: Floats | None
-    starts: Floats
-    runs: Runs
-    values: Floats
-    names: Sequence[str]
-    report_times: Floats
-    memory: dict[str, Any] = field(default_factory=dict)
+    engine: Any  # of a model of the same structure
+    engine_of: Callable[[int], Any]  # the engine of the model of a run, by its place
+    numbers: Floats | None  # of the compiled engines (W, m); None if all are those of `engine`
+    starts: Floats  # initial states (W, y), in the engine's order
+    runs: Runs  # what came of them
+    values: Floats  # of the variables (W, d)
+    names: Sequence[str]  # of the variables
+    report_times: Floats  # at which states were kept, s
+    memory: dict[str, Any] = field(default_factory=dict)  # where measures leave for each other what they have found
 
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
@@ -75,21 +63,13 @@ class Batch:
 
 @dataclass(frozen=True)
 class Measure:
-    """One number for each run.
+    """One number for each run."""
 
-    Attributes:
-        name: of the column.
-        of: computes them (W,); not a number where there is none.
-        watches: what it needs to have watched.
-        room: how many events of a run of so many seconds it looks at.
-        event_states: whether it looks at the states there.
-    """
-
-    name: str
-    of: Callable[[Batch], Any]
-    watches: tuple[Watch, ...] = ()
-    room: Callable[[float], int] = lambda to: 0
-    event_states: bool = False
+    name: str  # of the column
+    of: Callable[[Batch], Any]  # computes them (W,); not a number where there is none
+    watches: tuple[Watch, ...] = ()  # what it needs to have watched
+    room: Callable[[float], int] = lambda to: 0  # how many events of a run of so many seconds it looks at
+    event_states: bool = False  # whether it looks at the states there
 
 
 class State(Mapping[str, float]):
@@ -112,27 +92,16 @@ class State(Mapping[str, float]):
 
 @dataclass(frozen=True)
 class Run:
-    """One run, for a measure of your own.
+    """One run, for a measure of your own."""
 
-    Attributes:
-        values: of the variables, by name (rad, m).
-        start: initial state.
-        end: last state.
-        time: at which it ended, s.
-        times: moments up to the end at which the state was kept, if a report interval was asked for, s.
-        events: time (s), name of a contact or of what was watched, whether it begins.
-        largest_forces: N, by contact.
-        engine: that computed it, with its `mechanism`.
-    """
-
-    values: Mapping[str, float]
-    start: State
-    end: State
-    time: float
-    times: Floats
-    events: Sequence[tuple[float, str, bool]]
-    largest_forces: Mapping[str, float]
-    engine: Any = field(repr=False)
+    values: Mapping[str, float]  # of the variables, by name (rad, m)
+    start: State  # initial state
+    end: State  # last state
+    time: float  # at which it ended, s
+    times: Floats  # moments up to the end at which the state was kept, if a report interval was asked for, s
+    events: Sequence[tuple[float, str, bool]]  # time (s), name of a contact or of what was watched, whether it begins
+    largest_forces: Mapping[str, float]  # N, by contact
+    engine: Any = field(repr=False)  # that computed it, with its `mechanism`
     states: Floats = field(repr=False)
     quantities: Mapping[str, Quantity] = field(repr=False)
 

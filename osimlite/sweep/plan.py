@@ -55,44 +55,28 @@ class Stop:
 
 @dataclass(frozen=True)
 class Plan:
-    """Runs of one model, each with its own values of some numbers.
+    """Runs of one model, each with its own values of some numbers."""
 
-    Attributes:
-        text: the model as .osim.
-        variables: what differs.
-        measures: names of measures, ``module:function``, or functions.
-        to: how long a run lasts, s.
-        engine: that computes it, by name.
-        accuracy: of the integrator.
-        integrator: see :class:`osimlite.simulation.Options`; so too `wrapping`.
-        stops: what ends a run before.
-        is_planted: whether the walker is put on the ground with the deeper foot, at rest there, before each run.
-        feet: contacts of each foot of a walker, as `find_footing` takes them; found by its structure if left out.
-        report_interval: time between the moments that a measure of one's own can look at (s), None for none.
-        equilibrate: start muscles where fiber and tendon are in equilibrium.
-        interpolation: what is between the nodes of a control: "linear", "steps" or "cubic".
-        skip_unsupported: leave out forces that cannot be computed.
-        make: makes the model from parameters, where some of them are varied.
-        folder: of the model's file, where the files are that it names.
-    """
-
-    text: str
-    variables: tuple[Variable, ...]
-    measures: tuple[Any, ...] = DEFAULT_MEASURES
-    to: float = 2.0
-    engine: str = "compiled"
-    accuracy: float = DEFAULT_ACCURACY
-    integrator: str = MERSON
+    text: str  # the model as .osim
+    variables: tuple[Variable, ...]  # what differs
+    measures: tuple[Any, ...] = DEFAULT_MEASURES  # names of measures, `module:function`, or functions
+    to: float = 2.0  # how long a run lasts, s
+    engine: str = "compiled"  # that computes it, by name
+    accuracy: float = DEFAULT_ACCURACY  # of the integrator
+    integrator: str = MERSON  # see `Options`; so too `wrapping`
     wrapping: str = OPENSIM
-    stops: tuple[Stop, ...] = ()
+    stops: tuple[Stop, ...] = ()  # what ends a run before
+    # whether the walker is put on the ground with the deeper foot, at rest there, before each run
     is_planted: bool = False
+    # contacts of each foot of a walker, as `find_footing` takes them; found by its structure if left out
     feet: tuple[str, ...] | None = None
+    # time between the moments that a measure of one's own can look at (s), None for none
     report_interval: float | None = None
-    equilibrate: bool = False
-    interpolation: str = "linear"
-    skip_unsupported: bool = False
-    make: Maker | None = None
-    folder: str | None = None
+    equilibrate: bool = False  # start muscles where fiber and tendon are in equilibrium
+    interpolation: str = "linear"  # what is between the nodes of a control: "linear", "steps" or "cubic"
+    skip_unsupported: bool = False  # leave out forces that cannot be computed
+    make: Maker | None = None  # makes the model from parameters, where some of them are varied
+    folder: str | None = None  # of the model's file, where the files are that it names
 
     def model(self) -> Model:
         """The model, with none of the variables set."""

@@ -39,13 +39,9 @@ class WorkerLostError(OsimliteError):
 
 
 class Pool(Protocol):
-    """Takes work, such as samples, and puts what came of it into a queue.
+    """Takes work, such as samples, and puts what came of it into a queue."""
 
-    Attributes:
-        task_seconds: how long a task should take.
-    """
-
-    task_seconds: float
+    task_seconds: float  # how long a task should take
 
     @property
     def workers(self) -> int:

@@ -23,17 +23,11 @@ Step = str | int
 
 @dataclass(frozen=True)
 class Place:
-    """One number of a component.
+    """One number of a component."""
 
-    Attributes:
-        component: path.
-        steps: from the component to the number.
-        unit: in the words of the schema, empty if it has none.
-    """
-
-    component: str
-    steps: tuple[Step, ...]
-    unit: str
+    component: str  # path
+    steps: tuple[Step, ...]  # from the component to the number
+    unit: str  # in the words of the schema, empty if it has none
 
     def setter(self, model: Model) -> Setter:
         """What puts numbers there.

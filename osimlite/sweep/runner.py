@@ -25,21 +25,13 @@ Endings = list[tuple[str, str | None]]
 
 @dataclass(frozen=True)
 class Block:
-    """What came of some samples, in their order.
+    """What came of some samples, in their order."""
 
-    Attributes:
-        status: of each, `DONE`, `STOPPED` (by what the plan watches) or `FAILED`.
-        reasons: why it stopped or failed, else None.
-        times: at which it ended, s.
-        measures: by name (k,); not a number where there is none.
-        seconds: that the work took.
-    """
-
-    status: list[str]
-    reasons: list[str | None]
-    times: Floats
-    measures: dict[str, Floats]
-    seconds: float = 0.0
+    status: list[str]  # of each, `DONE`, `STOPPED` (by what the plan watches) or `FAILED`
+    reasons: list[str | None]  # why it stopped or failed, else None
+    times: Floats  # at which it ended, s
+    measures: dict[str, Floats]  # by name (k,); not a number where there is none
+    seconds: float = 0.0  # that the work took
 
     @classmethod
     def joined(cls, blocks: Sequence[Block]) -> Block:

@@ -30,20 +30,13 @@ MOST_SOBOL = 2**30
 
 @dataclass(frozen=True)
 class Samples:
-    """The runs of a sweep.
+    """The runs of a sweep."""
 
-    Attributes:
-        variables: d numbers that vary.
-        sampler: one of `SAMPLERS`.
-        count: N runs.
-        seed: what makes random samples the same again.
-        memory: of the last block, from which the next one goes on; for one thread at a time.
-    """
-
-    variables: tuple[Variable, ...]
-    sampler: str
-    count: int
-    seed: int = 0
+    variables: tuple[Variable, ...]  # d numbers that vary
+    sampler: str  # one of `SAMPLERS`
+    count: int  # N runs
+    seed: int = 0  # what makes random samples the same again
+    # of the last block, from which the next one goes on; for one thread at a time
     memory: dict[str, Sobol] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def block(self, first: int, count: int) -> Floats:

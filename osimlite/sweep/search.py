@@ -26,25 +26,15 @@ class BudgetExhausted(Exception):
 
 
 class Search(NamedTuple):
-    """How to search.
+    """How to search."""
 
-    Attributes:
-        start: first point (d,).
-        sigma: how far from it to look at first, as a fraction of the ranges.
-        popsize: points that are asked for together, or None for what suits the method.
-        seed: what makes it the same again.
-        is_bounded: whether points stay within the cube.
-        budget: evaluations that are allowed.
-        tolerance: of cost and points, at which the search ends; None for that of the method.
-    """
-
-    start: Floats
-    sigma: float
-    popsize: int | None
-    seed: int
-    is_bounded: bool
-    budget: int
-    tolerance: float | None = None
+    start: Floats  # first point (d,)
+    sigma: float  # how far from it to look at first, as a fraction of the ranges
+    popsize: int | None  # points that are asked for together, or None for what suits the method
+    seed: int  # what makes it the same again
+    is_bounded: bool  # whether points stay within the cube
+    budget: int  # evaluations that are allowed
+    tolerance: float | None = None  # of cost and points, at which the search ends; None for that of the method
 
 
 def cma(ask: Ask, search: Search, *, keeps_best: bool = False) -> str:

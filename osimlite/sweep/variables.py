@@ -89,25 +89,15 @@ Target = Start | Property | Control | Parameter | Slope
 
 @dataclass(frozen=True)
 class Variable:
-    """A number that differs from run to run.
+    """A number that differs from run to run."""
 
-    Attributes:
-        name: as it was given.
-        target: what it is.
-        low: least value, in rad, m or the unit of the property.
-        high: largest value.
-        count: of values in a grid.
-        is_log: whether its logarithm is what is spread evenly.
-        doubt: a sentence about what is odd in the range, else "".
-    """
-
-    name: str
-    target: Target
-    low: float
-    high: float
-    count: int | None = None
-    is_log: bool = False
-    doubt: str = ""
+    name: str  # as it was given
+    target: Target  # what it is
+    low: float  # least value, in rad, m or the unit of the property
+    high: float  # largest value
+    count: int | None = None  # of values in a grid
+    is_log: bool = False  # whether its logarithm is what is spread evenly
+    doubt: str = ""  # a sentence about what is odd in the range, else ""
 
     def at(self, fraction: Floats) -> Floats:
         """The values at fractions of the way from low to high, none of which is beyond them; exact at either end."""

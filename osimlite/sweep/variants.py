@@ -40,21 +40,13 @@ MOST_KEPT = 64
 
 @dataclass
 class Variant:
-    """A model made ready.
+    """A model made ready."""
 
-    Attributes:
-        state: what its states consist of.
-        structure: equal for variants that differ in numbers only.
-        numbers: all numbers of an engine that computes batches, empty for others.
-        maker: makes its engine.
-        simulation: that the engine is part of; None if only forces are new.
-    """
-
-    state: StateLayout
-    structure: bytes
-    numbers: Floats
-    maker: Callable[[], Any]
-    simulation: Simulation | None = None
+    state: StateLayout  # what its states consist of
+    structure: bytes  # equal for variants that differ in numbers only
+    numbers: Floats  # all numbers of an engine that computes batches, empty for others
+    maker: Callable[[], Any]  # makes its engine
+    simulation: Simulation | None = None  # that the engine is part of; None if only forces are new
 
     @cached_property
     def engine(self) -> Any:

@@ -31,22 +31,14 @@ class Error(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """One thing that the target cannot say.
+    """One thing that the target cannot say."""
 
-    Attributes:
-        kind: a word for what it concerns: force, contact-geometry, coordinate-range, gravity ...
-        component: absolute path in the model.
-        cannot_say: what the target cannot say.
-        done: what was done about it.
-        detail: the numbers and names of this case; may be empty.
-        errors: what was measured of an approximation, by the name of the quantity: length, value, force ...
-    """
-
-    kind: str
-    component: str
-    cannot_say: str
-    done: str
-    detail: str = ""
+    kind: str  # a word for what it concerns: force, contact-geometry, coordinate-range, gravity ...
+    component: str  # absolute path in the model
+    cannot_say: str  # what the target cannot say
+    done: str  # what was done about it
+    detail: str = ""  # the numbers and names of this case; may be empty
+    # what was measured of an approximation, by the name of the quantity: length, value, force ...
     errors: Mapping[str, Error] = field(default_factory=dict)
 
     @property

@@ -116,21 +116,13 @@ class Canvas:
 
 
 class _Spans(NamedTuple):
-    """Pixels side by side that a triangle covers.
+    """Pixels side by side that a triangle covers."""
 
-    Attributes:
-        triangles: to which they belong (s,).
-        starts: number of the first pixel (s,).
-        lengths: how many pixels (s,).
-        weights: of the triangle's corners at the first pixel's centre (s, 3).
-        changes: of the weights from one pixel to the next (s, 3).
-    """
-
-    triangles: Indices
-    starts: Indices
-    lengths: Indices
-    weights: Array
-    changes: Array
+    triangles: Indices  # to which they belong (s,)
+    starts: Indices  # number of the first pixel (s,)
+    lengths: Indices  # how many pixels (s,)
+    weights: Array  # of the triangle's corners at the first pixel's centre (s, 3)
+    changes: Array  # of the weights from one pixel to the next (s, 3)
 
     def pixels(self) -> tuple[Indices, Indices, Indices]:
         """All pixels (k,), the span of each, and its place in the span."""

@@ -42,19 +42,12 @@ MOMENTS = 25
 
 
 class Story(NamedTuple):
-    """What a page tells of its motion, which it then plays at once.
+    """What a page tells of its motion, which it then plays at once."""
 
-    Attributes:
-        words: what there is to see.
-        command: that makes more of it, for a terminal.
-        page: name of the file of this page.
-        pages: titles and files of all pages that belong together, in one folder.
-    """
-
-    words: str
-    command: str
-    page: str
-    pages: Sequence[tuple[str, str]]
+    words: str  # what there is to see
+    command: str  # that makes more of it, for a terminal
+    page: str  # name of the file of this page
+    pages: Sequence[tuple[str, str]]  # titles and files of all pages that belong together, in one folder
 
 
 def page_text(data: Mapping[str, Any]) -> str:

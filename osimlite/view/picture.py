@@ -41,19 +41,12 @@ _FINE = 2
 
 
 class Camera(NamedTuple):
-    """Looks at a model from infinitely far away.
+    """Looks at a model from infinitely far away."""
 
-    Attributes:
-        right: unit vector (3,) in ground that points to the right in the picture.
-        up: unit vector (3,) that points up in it.
-        center: the point (3,) of ground in the middle, m.
-        half: half the width and half the height of what is seen, m.
-    """
-
-    right: Array
-    up: Array
-    center: Array
-    half: tuple[float, float]
+    right: Array  # unit vector (3,) in ground that points to the right in the picture
+    up: Array  # unit vector (3,) that points up in it
+    center: Array  # the point (3,) of ground in the middle, m
+    half: tuple[float, float]  # half the width and half the height of what is seen, m
 
     @property
     def towards(self) -> Array:

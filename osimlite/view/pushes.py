@@ -17,17 +17,11 @@ LONGEST_ARROW = 0.4
 
 @dataclass(frozen=True, eq=False)
 class Push:
-    """A contact force at n moments, on a body of the scene.
+    """A contact force at n moments, on a body of the scene."""
 
-    Attributes:
-        on: the element, and the body.
-        forces: (n, 3) in ground, N.
-        torques: (n, 3) in ground about the body's origin, N·m, or None if they are not on record.
-    """
-
-    on: Pushed
-    forces: Array
-    torques: Array | None
+    on: Pushed  # the element, and the body
+    forces: Array  # (n, 3) in ground, N
+    torques: Array | None  # (n, 3) in ground about the body's origin, N·m, or None if they are not on record
 
     def point(self, number: int, bodies: Bodies) -> Array:
         """Where the force acts (3,) in ground: the point of its line of action nearest to the contact surface's middle.

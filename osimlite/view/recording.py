@@ -20,17 +20,11 @@ from osimlite.view.motion import at_times
 
 
 class MeasuredMarkers(NamedTuple):
-    """Markers that were measured during a motion, and those of the model that go with them.
+    """Markers that were measured during a motion, and those of the model that go with them."""
 
-    Attributes:
-        names: of the m markers.
-        stations: the body of each (-1 for ground), and its place there (3,), m.
-        places: where they were measured (t, m, 3), m; NaN where one was not seen.
-    """
-
-    names: Sequence[str]
-    stations: Sequence[tuple[int, Array]]
-    places: Array
+    names: Sequence[str]  # of the m markers
+    stations: Sequence[tuple[int, Array]]  # the body of each (-1 for ground), and its place there (3,), m
+    places: Array  # where they were measured (t, m, 3), m; NaN where one was not seen
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,15 +58,10 @@ PLAIN = "body{grid-template-columns:1fr!important}aside{display:none!important}"
 
 
 class Trial(NamedTuple):
-    """What is shown of a trial.
+    """What is shown of a trial."""
 
-    Attributes:
-        name: what it is called.
-        outcomes: of the setups that belong to it.
-    """
-
-    name: str
-    outcomes: Sequence[Outcome]
+    name: str  # what it is called
+    outcomes: Sequence[Outcome]  # of the setups that belong to it
 
     @property
     def evidence(self) -> Evidence | None:

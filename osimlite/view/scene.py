@@ -36,27 +36,16 @@ _FEW = 1500
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """A surface in one colour, fixed to a body.
+    """A surface in one colour, fixed to a body."""
 
-    Attributes:
-        path: absolute path of the component it shows.
-        layer: what it belongs to.
-        body: that carries it.
-        surface: its place among the surfaces of the scene.
-        matrix: (4, 4), of the surface in the body's frame; it may stretch and mirror.
-        color: red, green, blue, 0 to 1.
-        opacity: 0 to 1.
-        visible: whether the model wants it shown.
-    """
-
-    path: str
-    layer: Layer
-    body: int
-    surface: int
-    matrix: Array
-    color: Color
-    opacity: float = 1.0
-    visible: bool = True
+    path: str  # absolute path of the component it shows
+    layer: Layer  # what it belongs to
+    body: int  # that carries it
+    surface: int  # its place among the surfaces of the scene
+    matrix: Array  # (4, 4), of the surface in the body's frame; it may stretch and mirror
+    color: Color  # red, green, blue, 0 to 1
+    opacity: float = 1.0  # 0 to 1
+    visible: bool = True  # whether the model wants it shown
 
 
 class LinePoint(NamedTuple):
@@ -68,29 +57,18 @@ class LinePoint(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Straight lines from corner to corner: the path of a muscle, a spring, a stick for a body without shape.
+    """Straight lines from corner to corner: the path of a muscle, a spring, a stick for a body without shape."""
 
-    Attributes:
-        path: absolute path of the component it shows.
-        layer: what it belongs to.
-        course: two or more corners that are fixed to bodies, or the path whose corners they are.
-        color: red, green, blue, 0 to 1.
-        radius: how thick to draw it, m.
-        visible: whether the model wants it shown.
-        wraps: paths of the wrap objects that it may bend around.
-        fibers: how thick the fibers of a muscle are in their middle, m; 0 where there are none.
-        tendon: slack length of its tendon, m: half of it is at each end.
-    """
-
-    path: str
-    layer: Layer
+    path: str  # absolute path of the component it shows
+    layer: Layer  # what it belongs to
+    # two or more corners that are fixed to bodies, or the path whose corners they are
     course: tuple[LinePoint, ...] | Course
-    color: Color
-    radius: float = 0.004
-    visible: bool = True
-    wraps: tuple[str, ...] = ()
-    fibers: float = 0.0
-    tendon: float = 0.0
+    color: Color  # red, green, blue, 0 to 1
+    radius: float = 0.004  # how thick to draw it, m
+    visible: bool = True  # whether the model wants it shown
+    wraps: tuple[str, ...] = ()  # paths of the wrap objects that it may bend around
+    fibers: float = 0.0  # how thick the fibers of a muscle are in their middle, m; 0 where there are none
+    tendon: float = 0.0  # slack length of its tendon, m: half of it is at each end
 
     @property
     def start(self) -> LinePoint:
@@ -131,19 +109,12 @@ class Pushed:
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """A scene in a pose: where its bodies are, and its lines.
+    """A scene in a pose: where its bodies are, and its lines."""
 
-    Attributes:
-        scene: that is posed.
-        q: coordinate values (n,).
-        rotations: of the bodies in ground, (b + 1, 3, 3); the last one is ground itself.
-        origins: of the bodies in ground, (b + 1, 3), m.
-    """
-
-    scene: Scene
-    q: Array
-    rotations: Array
-    origins: Array
+    scene: Scene  # that is posed
+    q: Array  # coordinate values (n,)
+    rotations: Array  # of the bodies in ground, (b + 1, 3, 3); the last one is ground itself
+    origins: Array  # of the bodies in ground, (b + 1, 3), m
 
     @cached_property
     def lines(self) -> list[Array]:
@@ -170,29 +141,17 @@ class Bodies:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What there is to see of a model.
+    """What there is to see of a model."""
 
-    Attributes:
-        mechanism: moves it.
-        surfaces: that the items are made of.
-        items: all surfaces in their places.
-        lines: all paths, springs and sticks.
-        axes: all frames.
-        pushed: where contact forces are shown.
-        shown: the layers that the model wants to be shown at first.
-        half_spaces: paths of the half spaces, whose items show a part of them.
-        remarks: what cannot be shown, as (component's path, sentence).
-    """
-
-    mechanism: Mechanism
-    surfaces: Sequence[Surface]
-    items: Sequence[Item]
-    lines: Sequence[Line]
-    axes: Sequence[Axes]
-    pushed: Sequence[Pushed] = ()
-    shown: frozenset[Layer] = frozenset(LAYERS)
-    half_spaces: frozenset[str] = frozenset()
-    remarks: Sequence[tuple[str, str]] = ()
+    mechanism: Mechanism  # moves it
+    surfaces: Sequence[Surface]  # that the items are made of
+    items: Sequence[Item]  # all surfaces in their places
+    lines: Sequence[Line]  # all paths, springs and sticks
+    axes: Sequence[Axes]  # all frames
+    pushed: Sequence[Pushed] = ()  # where contact forces are shown
+    shown: frozenset[Layer] = frozenset(LAYERS)  # the layers that the model wants to be shown at first
+    half_spaces: frozenset[str] = frozenset()  # paths of the half spaces, whose items show a part of them
+    remarks: Sequence[tuple[str, str]] = ()  # what cannot be shown, as (component's path, sentence)
 
     def at(self, q: Array) -> Bodies:
         """Where all bodies are at coordinate values q (n,)."""

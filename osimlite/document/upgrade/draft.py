@@ -28,37 +28,22 @@ _FAMILY_OF_MEMBERS = {
 
 
 class Change(NamedTuple):
-    """One thing an upgrade did.
+    """One thing an upgrade did."""
 
-    Attributes:
-        step: the name of the step.
-        below: the version it leads to.
-        what: what that step does, in one line.
-        where: class and name of the component concerned.
-        number: the element it was found at, in document order.
-        lost: what the current format cannot say, if that was more than a default.
-    """
-
-    step: str
-    below: int
-    what: str
-    where: str
-    number: int
-    lost: str | None = None
+    step: str  # the name of the step
+    below: int  # the version it leads to
+    what: str  # what that step does, in one line
+    where: str  # class and name of the component concerned
+    number: int  # the element it was found at, in document order
+    lost: str | None = None  # what the current format cannot say, if that was more than a default
 
 
 class Refusal(NamedTuple):
-    """Something over which OpenSim's own upgrade of a document fails, where osimlite's does not.
+    """Something over which OpenSim's own upgrade of a document fails, where osimlite's does not."""
 
-    Attributes:
-        owner: the object that OpenSim is bringing up to date then; of one that it never reads nothing is asked.
-        number: the element concerned, in document order.
-        message: what is wrong, in one clause.
-    """
-
-    owner: int
-    number: int
-    message: str
+    owner: int  # the object that OpenSim is bringing up to date then; of one that it never reads nothing is asked
+    number: int  # the element concerned, in document order
+    message: str  # what is wrong, in one clause
 
 
 class Refused(Exception):

@@ -30,30 +30,19 @@ Material = tuple[float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class ContactSurface:
-    """A half space, a sphere, an ellipsoid or a mesh, fixed to a body (index, -1 for ground).
-
-    Attributes:
-        frame: name of the frame that holds it in the model.
-        center: of the sphere, or a point on the plane, in the body frame (m).
-        radius: of the sphere, the largest of the ellipsoid, or of the ball around the mesh (m); infinite for a half
-            space.
-        normal: unit vector out of the half space, in the body frame.
-        material: the law's K (Pa), c (s/m), us, ud (1), uv (s/m).
-        radii: half axes of an ellipsoid (m), None for the others.
-        axes: their directions in the body frame, as the columns of a matrix.
-        mesh: the triangles of a mesh, in the body frame.
-    """
+    """A half space, a sphere, an ellipsoid or a mesh, fixed to a body (index, -1 for ground)."""
 
     name: str
     body: int
-    frame: str
-    center: Triple
+    frame: str  # name of the frame that holds it in the model
+    center: Triple  # of the sphere, or a point on the plane, in the body frame (m)
+    # of the sphere, the largest of the ellipsoid, or of the ball around the mesh (m); infinite for a half space
     radius: float
-    normal: Triple
-    material: Material
-    radii: Triple | None = None
-    axes: tuple[Triple, Triple, Triple] | None = None
-    mesh: TriangleMesh | None = None
+    normal: Triple  # unit vector out of the half space, in the body frame
+    material: Material  # the law's K (Pa), c (s/m), us, ud (1), uv (s/m)
+    radii: Triple | None = None  # half axes of an ellipsoid (m), None for the others
+    axes: tuple[Triple, Triple, Triple] | None = None  # their directions in the body frame, as the columns of a matrix
+    mesh: TriangleMesh | None = None  # the triangles of a mesh, in the body frame
 
     @property
     def is_half_space(self) -> bool:

@@ -90,30 +90,19 @@ _TOKEN = re.compile(
 
 
 class Step(NamedTuple):
-    """One number of a formula.
+    """One number of a formula."""
 
-    Attributes:
-        law: "number", "negative", "+", "-", "*", or the name of a law.
-        arguments: registers that it is applied to.
-        value: the number, if it is one.
-    """
-
-    law: str
-    arguments: tuple[int, ...] = ()
-    value: float = 0.0
+    law: str  # "number", "negative", "+", "-", "*", or the name of a law
+    arguments: tuple[int, ...] = ()  # registers that it is applied to
+    value: float = 0.0  # the number, if it is one
 
 
 @dataclass(frozen=True)
 class Formula:
-    """A formula as a list of steps, so that neither its length nor its depth has a limit.
+    """A formula as a list of steps, so that neither its length nor its depth has a limit."""
 
-    Attributes:
-        variables: names of what it is computed from, in the first registers.
-        steps: each gives the number of the next register; the last one gives the result.
-    """
-
-    variables: tuple[str, ...]
-    steps: tuple[Step, ...]
+    variables: tuple[str, ...]  # names of what it is computed from, in the first registers
+    steps: tuple[Step, ...]  # each gives the number of the next register; the last one gives the result
 
     @classmethod
     def parse(cls, text: str, variables: Sequence[str], where: str) -> Formula:

@@ -200,17 +200,11 @@ def _inside(stiffness: Array, mesh: TriangleMesh, own: Pose, other: TriangleMesh
 
 @dataclass(frozen=True)
 class _Meshes:
-    """What computes the contact of two meshes, in Python.
+    """What computes the contact of two meshes, in Python."""
 
-    Attributes:
-        springs: of the meshes.
-        one: where the body of surface 1 is in its link.
-        two: where the body of surface 2 is in its link.
-    """
-
-    springs: Springs
-    one: Placement
-    two: Placement
+    springs: Springs  # of the meshes
+    one: Placement  # where the body of surface 1 is in its link
+    two: Placement  # where the body of surface 2 is in its link
 
     def __call__(self, s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> None:
         """Compute and apply the contact."""

@@ -35,33 +35,22 @@ CONTROLS = ""
 
 @dataclass(frozen=True)
 class Item:
-    """One item.
+    """One item."""
 
-    Attributes:
-        kernel: name of what computes it, see :func:`osimlite.simulation.kernels.table.law_function`.
-        ints: of its own.
-        numbers: of its own.
-        room: length of its record, if it is not that of a contact.
-        is_contact: whether its record is that of a contact.
-        is_part: whether another item of the element calls its kernel.
-        states: places among its integers where those of its element's states in y are put, in their order.
-        looks_at: which of its integers are places in the record of another element, which comes before, and the path of
-            that; or CONTROLS for the record of the controls.
-        equilibrium: name of the kernel that brings its states into equilibrium, if they have one.
-        response: of a force along one displacement.
-        python: what computes it in place of a kernel, called with (s, x, w, y, f, place of the item) as arrays.
-    """
-
-    kernel: str = ""
-    ints: tuple[int, ...] = ()
-    numbers: tuple[float, ...] = ()
-    room: int = 0
-    is_contact: bool = False
-    is_part: bool = False
+    kernel: str = ""  # name of what computes it, see `law_function`
+    ints: tuple[int, ...] = ()  # of its own
+    numbers: tuple[float, ...] = ()  # of its own
+    room: int = 0  # length of its record, if it is not that of a contact
+    is_contact: bool = False  # whether its record is that of a contact
+    is_part: bool = False  # whether another item of the element calls its kernel
+    # places among its integers where those of its element's states in y are put, in their order
     states: tuple[int, ...] = ()
+    # which of its integers are places in the record of another element, which comes before, and the path of that; or
+    # CONTROLS for the record of the controls
     looks_at: tuple[tuple[int, str], ...] = ()
-    equilibrium: str = ""
-    response: Response | None = None
+    equilibrium: str = ""  # name of the kernel that brings its states into equilibrium, if they have one
+    response: Response | None = None  # of a force along one displacement
+    # what computes it in place of a kernel, called with (s, x, w, y, f, place of the item) as arrays
     python: Callable[..., None] | None = None
 
 
@@ -115,17 +104,11 @@ class Silent:
 
 @dataclass(frozen=True)
 class Places:
-    """Where coordinates and bodies are.
+    """Where coordinates and bodies are."""
 
-    Attributes:
-        mechanism: of the model.
-        freedoms: degree of freedom of each coordinate that is free.
-        placements: of the bodies.
-    """
-
-    mechanism: Mechanism
-    freedoms: Mapping[int, int]
-    placements: list[Placement]
+    mechanism: Mechanism  # of the model
+    freedoms: Mapping[int, int]  # degree of freedom of each coordinate that is free
+    placements: list[Placement]  # of the bodies
 
     def freedom(self, coordinate: int) -> int:
         """Degree of freedom of a coordinate, -1 if it is locked."""

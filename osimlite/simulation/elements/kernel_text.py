@@ -29,13 +29,9 @@ SMALL_CHANGE = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class KernelText:
-    """Writes the kernels of a kind.
+    """Writes the kernels of a kind."""
 
-    Attributes:
-        kind: the declaration.
-    """
-
-    kind: Kind
+    kind: Kind  # the declaration
 
     @cached_property
     def kernel(self) -> Callable[..., int]:

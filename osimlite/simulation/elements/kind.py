@@ -39,21 +39,14 @@ ENERGY = "energy"
 
 @dataclass(frozen=True)
 class State:
-    """A state of a kind: the law is given its value, and gives its derivative.
+    """A state of a kind: the law is given its value, and gives its derivative."""
 
-    Attributes:
-        name: as OpenSim has it.
-        start: value at the beginning, from the component; its property `default_<name>` if left out, 0 if it has none.
-        given: whether the law is given its value at all.
-        output: name of the output that is its derivative; `<name>_rate` if left out.
-        is_simbody: whether Simbody keeps it, in OpenSim.
-    """
-
-    name: str
+    name: str  # as OpenSim has it
+    # value at the beginning, from the component; its property `default_<name>` if left out, 0 if it has none
     start: Callable[[Any], float] | None = None
-    given: bool = True
-    output: str = ""
-    is_simbody: bool = False
+    given: bool = True  # whether the law is given its value at all
+    output: str = ""  # name of the output that is its derivative; `<name>_rate` if left out
+    is_simbody: bool = False  # whether Simbody keeps it, in OpenSim
 
     def at_start(self, component: Any) -> float:
         """Its value at the beginning."""
@@ -215,25 +208,17 @@ class Kind:
 
 @dataclass(frozen=True)
 class DeclaredForce:
-    """One force of a kind that is declared.
-
-    Attributes:
-        component: its class.
-        path: of the component.
-        name: of the component.
-        place: where it acts, as the geometry has it.
-        values: of the parameters.
-        optional_states: for each state of the kind what it is called and where it starts, None if there is none.
-    """
+    """One force of a kind that is declared."""
 
     form: ClassVar[str] = ""
     """Of its kernel, behind the name of the kind."""
 
-    component: type
-    path: str
-    name: str
-    place: Any
-    values: tuple[Any, ...]
+    component: type  # its class
+    path: str  # of the component
+    name: str  # of the component
+    place: Any  # where it acts, as the geometry has it
+    values: tuple[Any, ...]  # of the parameters
+    # for each state of the kind what it is called and where it starts, None if there is none
     optional_states: tuple[StateVariable | None, ...] = ()
 
     @property

@@ -49,15 +49,10 @@ class Tail:
 
 
 class Parameter(ABC):
-    """Something that a law is given of a component.
+    """Something that a law is given of a component."""
 
-    Attributes:
-        size: how many numbers of fixed place it takes.
-        heads: how many integers that say where something of variable length is.
-    """
-
-    size: int = 0
-    heads: int = 0
+    size: int = 0  # how many numbers of fixed place it takes
+    heads: int = 0  # how many integers that say where something of variable length is
 
     @abstractmethod
     def read(self, builder: ElementBuilder, force: Any) -> Any:
@@ -78,17 +73,11 @@ class Parameter(ABC):
 
 @dataclass(frozen=True)
 class Number(Parameter):
-    """A property that is a number, or a yes or no that the law is given as 1 or 0.
+    """A property that is a number, or a yes or no that the law is given as 1 or 0."""
 
-    Attributes:
-        name: of the property.
-        accepts: whether a number will do.
-        needs: what is said of one that does not, after "the <name> of '<path>' ".
-    """
-
-    name: str
-    accepts: Callable[[float], bool] = lambda value: True
-    needs: str = ""
+    name: str  # of the property
+    accepts: Callable[[float], bool] = lambda value: True  # whether a number will do
+    needs: str = ""  # what is said of one that does not, after "the <name> of '<path>' "
     size = 1
 
     def read(self, builder: ElementBuilder, force: Any) -> float:
@@ -115,15 +104,10 @@ def positive(name: str) -> Number:
 
 @dataclass(frozen=True)
 class Numbers(Parameter):
-    """Several numbers that are computed together.
+    """Several numbers that are computed together."""
 
-    Attributes:
-        count: how many.
-        of: from a component and the builder.
-    """
-
-    count: int
-    of: Callable[[ElementBuilder, Any], Sequence[float]]
+    count: int  # how many
+    of: Callable[[ElementBuilder, Any], Sequence[float]]  # from a component and the builder
 
     @property
     def size(self) -> int:  # type: ignore[override]
@@ -226,15 +210,10 @@ class Curve(Parameter):
 
 @dataclass(frozen=True)
 class Together(Parameter):
-    """Several of these that the law is given as one named tuple.
+    """Several of these that the law is given as one named tuple."""
 
-    Attributes:
-        type: the tuple.
-        terms: what is in each of its fields.
-    """
-
-    type: type[Any]
-    terms: tuple[Parameter, ...]
+    type: type[Any]  # the tuple
+    terms: tuple[Parameter, ...]  # what is in each of its fields
 
     @property
     def size(self) -> int:  # type: ignore[override]
@@ -266,15 +245,10 @@ class Together(Parameter):
 
 @dataclass(frozen=True)
 class Expression(Parameter):
-    """A property that is a formula; the law is given its steps, constants and registers, for `compute`.
+    """A property that is a formula; the law is given its steps, constants and registers, for `compute`."""
 
-    Attributes:
-        name: of the property.
-        variables: that it may name.
-    """
-
-    name: str
-    variables: tuple[str, ...]
+    name: str  # of the property
+    variables: tuple[str, ...]  # that it may name
     heads = 3
 
     def read(self, builder: ElementBuilder, force: Any) -> Formula:
@@ -300,14 +274,10 @@ class Expressions(Parameter):
 
     The law is given the steps of each, with their count and the place of its constants before them; the numbers that
     these places count from; and the registers that they share.
-
-    Attributes:
-        names: of the properties.
-        variables: that they may name.
     """
 
-    names: tuple[str, ...]
-    variables: tuple[str, ...]
+    names: tuple[str, ...]  # of the properties
+    variables: tuple[str, ...]  # that they may name
     heads = 2
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[Formula, ...]:

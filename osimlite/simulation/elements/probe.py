@@ -44,24 +44,16 @@ class Subject(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """What a probe reads.
+    """What a probe reads."""
 
-    Attributes:
-        labels: of its results.
-        subjects: what the law is called for.
-        first: place among the results of that of the first subject; -1 if the sum is all there is. The sum is the first
-            result unless the subjects begin there.
-        constant: that the sum begins with; it is the second result if the subjects begin after it.
-        curve: that the law is given.
-        details: what a measure must know.
-    """
-
-    labels: tuple[str, ...]
-    subjects: tuple[Subject, ...] = ()
+    labels: tuple[str, ...]  # of its results
+    subjects: tuple[Subject, ...] = ()  # what the law is called for
+    # place among the results of that of the first subject; -1 if the sum is all there is. The sum is the first result
+    # unless the subjects begin there.
     first: int = -1
-    constant: float = 0.0
-    curve: Function | None = None
-    details: Any = ()
+    constant: float = 0.0  # that the sum begins with; it is the second result if the subjects begin after it
+    curve: Function | None = None  # that the law is given
+    details: Any = ()  # what a measure must know
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,29 +120,18 @@ class ProbeKind:
 
 @dataclass(frozen=True)
 class DeclaredProbe(Silent):
-    """One probe; see :class:`osimlite.simulation.elements.items.ForceElement` for what it is to the kernels.
+    """One probe; see :class:`osimlite.simulation.elements.items.ForceElement` for what it is to the kernels."""
 
-    Attributes:
-        component: its class.
-        path: of the component.
-        name: of the component.
-        operation: what is made of its results: "value", "integrate" and so on.
-        gain: factor of what is reported.
-        initial: where integrals start.
-        reading: what it reads.
-        places: for each subject and each thing that it reads, the element whose record has it, and where there.
-        numbers: that the law is given of each subject.
-    """
-
-    component: type
-    path: str
-    name: str
-    operation: str
-    gain: float
-    initial: tuple[float, ...]
-    reading: Reading
+    component: type  # its class
+    path: str  # of the component
+    name: str  # of the component
+    operation: str  # what is made of its results: "value", "integrate" and so on
+    gain: float  # factor of what is reported
+    initial: tuple[float, ...]  # where integrals start
+    reading: Reading  # what it reads
+    # for each subject and each thing that it reads, the element whose record has it, and where there
     places: tuple[tuple[tuple[str, int], ...], ...] = ()
-    numbers: tuple[tuple[float, ...], ...] = ()
+    numbers: tuple[tuple[float, ...], ...] = ()  # that the law is given of each subject
 
     @property
     def kind(self) -> ProbeKind:

@@ -16,13 +16,9 @@ from osimlite.text import did_you_mean
 
 @dataclass(frozen=True)
 class TableColumn(PiecewiseLinear):
-    """Straight lines between the rows of a table, outside of which there is nothing.
+    """Straight lines between the rows of a table, outside of which there is nothing."""
 
-    Attributes:
-        source: path of the component that has the table.
-    """
-
-    source: str = ""
+    source: str = ""  # path of the component that has the table
 
 
 def signal(builder: ElementBuilder, controller: Any, text: str) -> Function | None:

@@ -32,15 +32,10 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
-    """A closed surface.
+    """A closed surface."""
 
-    Attributes:
-        points: (n, 3), m.
-        triangles: (t, 3) places of points, counter-clockwise seen from outside.
-    """
-
-    points: Array
-    triangles: Indices
+    points: Array  # (n, 3), m
+    triangles: Indices  # (t, 3) places of points, counter-clockwise seen from outside
 
     @classmethod
     def read(cls, name: str, folders: MeshFolders) -> TriangleMesh:

@@ -25,24 +25,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Settings:
-    """How to step.
+    """How to step."""
 
-    Attributes:
-        accuracy: as OpenSim understands it.
-        integrator: with error control, see :class:`osimlite.simulation.Options`.
-        fixed_step: s; the engine's own steps of this length instead of error control.
-        route: the way to the accelerations, in the engine's words; "auto" lets it choose.
-        show: whether to show the motion in a window while it is computed.
-        visuals: what bodies look like there.
-        step_bounds: shortest and longest step (s) of Merson's method; the shortest is taken whatever its error.
-    """
-
-    accuracy: float = DEFAULT_ACCURACY
-    integrator: str = MERSON
-    fixed_step: float | None = None
-    route: str = "auto"
-    show: bool = False
-    visuals: Visuals | None = None
+    accuracy: float = DEFAULT_ACCURACY  # as OpenSim understands it
+    integrator: str = MERSON  # with error control, see `Options`
+    fixed_step: float | None = None  # s; the engine's own steps of this length instead of error control
+    route: str = "auto"  # the way to the accelerations, in the engine's words; "auto" lets it choose
+    show: bool = False  # whether to show the motion in a window while it is computed
+    visuals: Visuals | None = None  # what bodies look like there
+    # shortest and longest step (s) of Merson's method; the shortest is taken whatever its error
     step_bounds: tuple[float, float] = NO_BOUNDS
 
 
@@ -50,28 +41,18 @@ class Engine(Protocol):
     """Computes the motion of one mechanism under its forces. Close it after use, or use it in a ``with`` statement.
 
     Every method that takes a state raises an OsimliteError where it has another length than `state` says.
-
-    Attributes:
-        name: of the engine.
-        version: of the program behind it.
-        route: how the accelerations are computed.
-        order: place in the mechanism of each coordinate of the state.
-        state: what the numbers of a state are.
-        contacts: names of the contacts, by number.
-        columns: labels of the force records.
-        probes: of the model.
-        loads: after an evaluation: the last entry has the bits of the contacts that touch; entry i is the force (N,
-            in ground) of contact i if it does.
     """
 
-    name: str
-    version: str
-    route: str
-    order: tuple[int, ...]
-    state: StateLayout
-    contacts: tuple[str, ...]
-    columns: tuple[str, ...]
-    probes: tuple[DeclaredProbe, ...]
+    name: str  # of the engine
+    version: str  # of the program behind it
+    route: str  # how the accelerations are computed
+    order: tuple[int, ...]  # place in the mechanism of each coordinate of the state
+    state: StateLayout  # what the numbers of a state are
+    contacts: tuple[str, ...]  # names of the contacts, by number
+    columns: tuple[str, ...]  # labels of the force records
+    probes: tuple[DeclaredProbe, ...]  # of the model
+    # after an evaluation: the last entry has the bits of the contacts that touch; entry i is the force (N, in ground)
+    # of contact i if it does
     loads: list[object]
 
     def derivative(self, t: float, y: list[float]) -> list[float]:

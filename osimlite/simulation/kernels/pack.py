@@ -50,30 +50,19 @@ LAWS_OF_FUNCTIONS = {
 
 @dataclass
 class Packed:
-    """A mechanism with its forces, packed.
+    """A mechanism with its forces, packed."""
 
-    Attributes:
-        structure: the integers, with no addresses in them.
-        numbers: the numbers.
-        laws: names of the engine's own functions that must be there.
-        kernels: by place in the structure what computes an item: a name, or a function of Python.
-        equilibria: by place in the structure the name of what brings an item into equilibrium.
-        responses: by place in the structure the name of what finds the derivatives of an item.
-        owners: by place in the structure of an item the number of its force element.
-        order: place in the mechanism of the coordinate of each degree of freedom.
-        placements: of every body its link (-1 for ground) and its frame in that.
-        items: of every force element the records of its items in the work vector, as place and length.
-    """
-
-    structure: Ints
-    numbers: Floats
-    laws: tuple[str, ...]
+    structure: Ints  # the integers, with no addresses in them
+    numbers: Floats  # the numbers
+    laws: tuple[str, ...]  # names of the engine's own functions that must be there
+    # by place in the structure what computes an item: a name, or a function of Python
     kernels: dict[int, str | Callable[..., None]]
-    equilibria: dict[int, str]
-    responses: dict[int, str]
-    owners: dict[int, int]
-    order: tuple[int, ...]
-    placements: list[Placement]
+    equilibria: dict[int, str]  # by place in the structure the name of what brings an item into equilibrium
+    responses: dict[int, str]  # by place in the structure the name of what finds the derivatives of an item
+    owners: dict[int, int]  # by place in the structure of an item the number of its force element
+    order: tuple[int, ...]  # place in the mechanism of the coordinate of each degree of freedom
+    placements: list[Placement]  # of every body its link (-1 for ground) and its frame in that
+    # of every force element the records of its items in the work vector, as place and length
     items: list[list[tuple[int, int]]]
 
 

@@ -25,25 +25,15 @@ Balls = Mapping[tuple[int, ...], int]
 
 
 class ConstraintRecord(NamedTuple):
-    """One constraint.
+    """One constraint."""
 
-    Attributes:
-        law: its name.
-        ints: of its own.
-        numbers: of its own.
-        equations: how many.
-        positions: how many of these, from the first on, bind positions.
-        room: length of its room in the work vector.
-        room_at: which of its integers is the place of that.
-    """
-
-    law: str
-    ints: list[int]
-    numbers: list[float]
-    equations: int = 1
-    positions: int = 1
-    room: int = 0
-    room_at: int = -1
+    law: str  # its name
+    ints: list[int]  # of its own
+    numbers: list[float]  # of its own
+    equations: int = 1  # how many
+    positions: int = 1  # how many of these, from the first on, bind positions
+    room: int = 0  # length of its room in the work vector
+    room_at: int = -1  # which of its integers is the place of that
 
 
 class _Vector(NamedTuple):

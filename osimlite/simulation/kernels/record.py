@@ -39,41 +39,28 @@ class Motion(NamedTuple):
     """What a run works on and writes down; any of the records may have no rows.
 
     A state has y numbers, see STATE_SIZE.
-
-    Attributes:
-        s: the mechanism.
-        x: its numbers.
-        w: room; at METHOD_AT the method's.
-        sizes: see MOST_TRIES.
-        clock: time and next step to try, s; changed.
-        counts: steps taken, tried, evaluations, reports made, steps logged, events; changed. Events beyond the room
-            for them are counted only.
-        times: of the reports, s (r,).
-        reports: states at these times (r, y).
-        log: of each step the time, y, f (k, 1 + 2y).
-        forces: of each step the force on surface 2 of each pair (k, P, 3).
-        events: time, number (of a contact, or P and the number of a watch), 1 if it begins or rises, else 0, and if
-            there is room the state (e, 3 or 3 + y).
-        peaks: largest force of each pair at the end of a step, and its time (P, 2).
-        watches: kind, degree of freedom or link or contact, and -1 or 1 if falling or rising through the level ends the
-            run, 0 if neither (w, 3).
-        levels: of each watch the station in the link, the direction in ground, and the level (w, 7).
     """
 
-    s: Ints
-    x: Floats
-    w: Floats
-    sizes: Ints
-    clock: Floats
+    s: Ints  # the mechanism
+    x: Floats  # its numbers
+    w: Floats  # room; at METHOD_AT the method's
+    sizes: Ints  # see MOST_TRIES
+    clock: Floats  # time and next step to try, s; changed
+    # steps taken, tried, evaluations, reports made, steps logged, events; changed. Events beyond the room for them
+    # are counted only.
     counts: Ints
-    times: Floats
-    reports: Floats
-    log: Floats
-    forces: Floats
+    times: Floats  # of the reports, s (r,)
+    reports: Floats  # states at these times (r, y)
+    log: Floats  # of each step the time, y, f (k, 1 + 2y)
+    forces: Floats  # of each step the force on surface 2 of each pair (k, P, 3)
+    # time, number (of a contact, or P and the number of a watch), 1 if it begins or rises, else 0, and if there is
+    # room the state (e, 3 or 3 + y)
     events: Floats
-    peaks: Floats
+    peaks: Floats  # largest force of each pair at the end of a step, and its time (P, 2)
+    # kind, degree of freedom or link or contact, and -1 or 1 if falling or rising through the level ends the run, 0
+    # if neither (w, 3)
     watches: Ints
-    levels: Floats
+    levels: Floats  # of each watch the station in the link, the direction in ground, and the level (w, 7)
 
 
 def evaluated(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int:

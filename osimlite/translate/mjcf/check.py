@@ -34,23 +34,14 @@ FOLLOWED = 4
 
 @dataclass(frozen=True)
 class MuscleCheck:
-    """What became of a muscle, or of another force along a path.
+    """What became of a muscle, or of another force along a path."""
 
-    Attributes:
-        name: its own.
-        length: of the path, m.
-        arms: moment arms by coordinate, m or 1.
-        force: isometric, fully active, over the greatest force; None for what is no muscle.
-        fiber: optimal fiber length that the file implies, over the model's.
-        tendon: tendon slack length that the file implies, minus the model's, m.
-    """
-
-    name: str
-    length: Error
-    arms: Mapping[str, Error]
-    force: Error | None = None
-    fiber: float | None = None
-    tendon: float | None = None
+    name: str  # its own
+    length: Error  # of the path, m
+    arms: Mapping[str, Error]  # moment arms by coordinate, m or 1
+    force: Error | None = None  # isometric, fully active, over the greatest force; None for what is no muscle
+    fiber: float | None = None  # optimal fiber length that the file implies, over the model's
+    tendon: float | None = None  # tendon slack length that the file implies, minus the model's, m
 
     @property
     def worst_arm(self) -> Error:
@@ -60,18 +51,12 @@ class MuscleCheck:
 
 @dataclass(frozen=True)
 class Check:
-    """What a file makes of a model.
+    """What a file makes of a model."""
 
-    Attributes:
-        muscles: those that both have.
-        missing: names of forces along paths that the file does not have.
-        coordinates: names of coordinates that move by themselves and that no joint of the file has.
-        bodies: places of the bodies that both have, moved onto each other as one in every pose; None without three.
-    """
-
-    muscles: tuple[MuscleCheck, ...]
-    missing: tuple[str, ...] = ()
-    coordinates: tuple[str, ...] = ()
+    muscles: tuple[MuscleCheck, ...]  # those that both have
+    missing: tuple[str, ...] = ()  # names of forces along paths that the file does not have
+    coordinates: tuple[str, ...] = ()  # names of coordinates that move by themselves and that no joint of the file has
+    # places of the bodies that both have, moved onto each other as one in every pose; None without three
     bodies: Error | None = None
 
     def to_json(self) -> str:

@@ -46,23 +46,14 @@ class Unsayable(Exception):
 
 @dataclass(frozen=True)
 class Options:
-    """What the user chooses.
+    """What the user chooses."""
 
-    Attributes:
-        version: of MuJoCo, whose first number decides what a side site means.
-        visuals: whether to say what bodies look like.
-        contact: whether contact forces become contacts of MuJoCo's own law, or nothing.
-        fit: what is fitted: nothing, what tendons go around, or that and the forces of muscles.
-        spline: what a joint follows that is no polynomial: one quartic, or a quartic of a quartic.
-        driver: whether `osimlite.mjcf.Driver` moves the model, which computes functions and forces itself.
-    """
-
-    version: Version = 4
-    visuals: bool = True
-    contact: Contact = "native"
-    fit: Fit = "none"
-    spline: Spline = "series"
-    driver: bool = False
+    version: Version = 4  # of MuJoCo, whose first number decides what a side site means
+    visuals: bool = True  # whether to say what bodies look like
+    contact: Contact = "native"  # whether contact forces become contacts of MuJoCo's own law, or nothing
+    fit: Fit = "none"  # what is fitted: nothing, what tendons go around, or that and the forces of muscles
+    spline: Spline = "series"  # what a joint follows that is no polynomial: one quartic, or a quartic of a quartic
+    driver: bool = False  # whether `osimlite.mjcf.Driver` moves the model, which computes functions and forces itself
 
 
 class Lead(NamedTuple):
@@ -115,40 +106,26 @@ def add(parent: _Element, tag: str, **attributes: Value) -> _Element:
 
 @dataclass
 class Draft:
-    """A model on its way to MJCF.
+    """A model on its way to MJCF."""
 
-    Attributes:
-        model: the model.
-        robot: its mechanism as one-axis joints; locked coordinates are fixed joints.
-        fidelity: the account; a pass puts components into `translated`, and what is lost into records.
-        options: what the user chooses.
-        folder: where the model's file is, and the files that it names.
-        mesh_files: takes up the mesh files that the text names.
-        root: the element ``<mujoco>``.
-        bodies: the element of each body by its index in the mechanism, of ground (-1) too. Its frame is the body's.
-        frames: element and frame (4, 4) in it of those links of the robot that stand still in an element, by name.
-        leads: the joint that stands for a coordinate, by the coordinate's place in the mechanism; none if it is locked.
-        followers: what equality constraints make of joints, by name.
-        helpers: those of them that move nothing, but are what others follow.
-        starts: values (rad, m) in the default pose of joints that a pass has added besides those of the robot, by name.
-        tendons: of paths, by the absolute path of their owners.
-        activations: at the start, of the actuators that have one, by name.
-    """
-
-    model: Model
-    robot: Robot
-    fidelity: Fidelity
-    options: Options
-    folder: Path | None
-    mesh_files: MeshFiles
-    root: _Element = field(default_factory=lambda: Element("mujoco"))
+    model: Model  # the model
+    robot: Robot  # its mechanism as one-axis joints; locked coordinates are fixed joints
+    fidelity: Fidelity  # the account; a pass puts components into `translated`, and what is lost into records
+    options: Options  # what the user chooses
+    folder: Path | None  # where the model's file is, and the files that it names
+    mesh_files: MeshFiles  # takes up the mesh files that the text names
+    root: _Element = field(default_factory=lambda: Element("mujoco"))  # the element `<mujoco>`
+    # the element of each body by its index in the mechanism, of ground (-1) too. Its frame is the body's.
     bodies: dict[int, _Element] = field(default_factory=dict)
+    # element and frame (4, 4) in it of those links of the robot that stand still in an element, by name
     frames: dict[str, tuple[_Element, Array]] = field(default_factory=dict)
+    # the joint that stands for a coordinate, by the coordinate's place in the mechanism; none if it is locked
     leads: dict[int, Lead] = field(default_factory=dict)
-    followers: dict[str, Follower] = field(default_factory=dict)
-    helpers: set[str] = field(default_factory=set)
-    tendons: dict[str, Tied] = field(default_factory=dict)
-    activations: dict[str, float] = field(default_factory=dict)
+    followers: dict[str, Follower] = field(default_factory=dict)  # what equality constraints make of joints, by name
+    helpers: set[str] = field(default_factory=set)  # those of them that move nothing, but are what others follow
+    tendons: dict[str, Tied] = field(default_factory=dict)  # of paths, by the absolute path of their owners
+    activations: dict[str, float] = field(default_factory=dict)  # at the start, of the actuators that have one, by name
+    # values (rad, m) in the default pose of joints that a pass has added besides those of the robot, by name
     starts: dict[str, float] = field(default_factory=dict)
     _names: dict[str, set[str | None]] = field(default_factory=dict)
     _meshes: dict[tuple[str, tuple[float, float, float]], str] = field(default_factory=dict)

@@ -51,27 +51,16 @@ FREE = 0.25
 
 
 class Curves(NamedTuple):
-    """What MuJoCo knows of a muscle, but for its rates.
+    """What MuJoCo knows of a muscle, but for its rates."""
 
-    Attributes:
-        tendon: length of the tendon, m.
-        fiber: optimal length of the fibers along the tendon, m.
-        force: at the optimal length, fully active and at rest, N.
-        lmin: normalized length below which there is no active force.
-        lmax: that above which there is none.
-        end: the passive force is a line from halfway between 1 and here.
-        fpmax: twice the passive force there, halfway, over `force`.
-        shift: by so much more than 1 the normalized length is where the passive force begins.
-    """
-
-    tendon: float
-    fiber: float
-    force: float
-    lmin: float = 0.5
-    lmax: float = 1.6
-    end: float = 1.6
-    fpmax: float = 1.3
-    shift: float = 0.0
+    tendon: float  # length of the tendon, m
+    fiber: float  # optimal length of the fibers along the tendon, m
+    force: float  # at the optimal length, fully active and at rest, N
+    lmin: float = 0.5  # normalized length below which there is no active force
+    lmax: float = 1.6  # that above which there is none
+    end: float = 1.6  # the passive force is a line from halfway between 1 and here
+    fpmax: float = 1.3  # twice the passive force there, halfway, over `force`
+    shift: float = 0.0  # by so much more than 1 the normalized length is where the passive force begins
 
     def tension(self, lengths: Array, activation: float) -> Array:
         """Tension (L,) that MuJoCo gives the muscle at lengths of its tendon (L,), m, at rest."""

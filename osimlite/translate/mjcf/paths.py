@@ -106,13 +106,9 @@ _NAMES = {
 
 @dataclass
 class _Writer:
-    """Writes tendons, each site and surface once.
+    """Writes tendons, each site and surface once."""
 
-    Attributes:
-        draft: what they are written into.
-    """
-
-    draft: Draft
+    draft: Draft  # what they are written into
     _geoms: dict[tuple[Any, ...], str] = field(default_factory=dict)
 
     def tendon(self, path: str, tendon: Tendon) -> str:

@@ -27,23 +27,16 @@ class Poses:
     """P poses of a mechanism of b bodies and n coordinates, of which m move; arrays over bodies end with ground.
 
     Only the bodies that were asked for, and those that carry them, have numbers that mean something.
-
-    Attributes:
-        q: values of the coordinates (P, n).
-        moving: places (m,) of the coordinates that move by themselves: neither locked nor coupled.
-        rotations: of the bodies in ground (b + 1, P, 3, 3).
-        origins: of the bodies in ground (b + 1, P, 3), m.
-        jacobians: (b + 1, P, 6, m) from the speeds of those coordinates, all that must move with them included, to the
-            angular velocity and the velocity of the origin of each body.
-        rates: of all coordinates (P, n, m) by these speeds.
     """
 
-    q: Array
-    moving: Array
-    rotations: Array
-    origins: Array
+    q: Array  # values of the coordinates (P, n)
+    moving: Array  # places (m,) of the coordinates that move by themselves: neither locked nor coupled
+    rotations: Array  # of the bodies in ground (b + 1, P, 3, 3)
+    origins: Array  # of the bodies in ground (b + 1, P, 3), m
+    # (b + 1, P, 6, m) from the speeds of those coordinates, all that must move with them included, to the angular
+    # velocity and the velocity of the origin of each body
     jacobians: Array
-    rates: Array
+    rates: Array  # of all coordinates (P, n, m) by these speeds
 
     def seen_by(self, columns: Sequence[int]) -> Poses:
         """The same with some of the moving coordinates, by their places in `moving`."""

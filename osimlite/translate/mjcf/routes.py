@@ -36,19 +36,12 @@ Choose = Callable[[Sequence[Tendon]], Tendon]
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """Where a path touches a surface, in the k of the poses in which it does.
+    """Where a path touches a surface, in the k of the poses in which it does."""
 
-    Attributes:
-        poses: their places (k,).
-        first: tangent points (k, 3) in the body of the surface, m.
-        second: the others (k, 3).
-        after: numbers of the path points before them (k,).
-    """
-
-    poses: Places
-    first: Array
-    second: Array
-    after: Places
+    poses: Places  # their places (k,)
+    first: Array  # tangent points (k, 3) in the body of the surface, m
+    second: Array  # the others (k, 3)
+    after: Places  # numbers of the path points before them (k,)
 
 
 class Router:

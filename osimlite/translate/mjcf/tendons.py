@@ -40,25 +40,15 @@ class Spot:
 
 @dataclass(frozen=True, eq=False)
 class Around:
-    """A surface that a tendon goes around.
+    """A surface that a tendon goes around."""
 
-    Attributes:
-        body: that it is in.
-        frame: of the surface (4, 4) in the body; a cylinder is about z.
-        kind: ``"sphere"`` or ``"cylinder"``.
-        radius: m.
-        side: the side site, or None.
-        length: of the cylinder as it is drawn, m.
-        name: of the wrap object; empty for one that OpenSim does not know.
-    """
-
-    body: int
-    frame: Array
-    kind: str
-    radius: float
-    side: Spot | None = None
-    length: float = 0.0
-    name: str = ""
+    body: int  # that it is in
+    frame: Array  # of the surface (4, 4) in the body; a cylinder is about z
+    kind: str  # `"sphere"` or `"cylinder"`
+    radius: float  # m
+    side: Spot | None = None  # the side site, or None
+    length: float = 0.0  # of the cylinder as it is drawn, m
+    name: str = ""  # of the wrap object; empty for one that OpenSim does not know
 
     def sided(self, direction: Array | None) -> Around:
         """The same with the side site in a direction (3,), in the frame of the surface, well outside; or without."""

@@ -32,22 +32,15 @@ ROUNDING = 1e-9
 
 
 class Bends(NamedTuple):
-    """How a tendon bends around each of S surfaces in P poses, in each of C ways; what is not touched goes straight on.
+    """How a tendon bends around each of S surfaces in P poses, in each of C ways; past others it goes straight on."""
 
-    Attributes:
-        touches: whether it touches (C, S, P).
-        first: where the tendon leads to from the first end (C, S, P, 3), in the frame of the surface, m: a tangent
-            point, or the second end.
-        second: where it comes to the second end from (C, S, P, 3).
-        length: on the surface (C, S, P), m.
-        choice: which way it goes with each of k side sites (k, P); without any, one for each surface.
-    """
-
-    touches: Mask
+    touches: Mask  # whether it touches (C, S, P)
+    # where the tendon leads to from the first end (C, S, P, 3), in the frame of the surface, m: a tangent point, or
+    # the second end
     first: Array
-    second: Array
-    length: Array
-    choice: NDArray[np.intp]
+    second: Array  # where it comes to the second end from (C, S, P, 3)
+    length: Array  # on the surface (C, S, P), m
+    choice: NDArray[np.intp]  # which way it goes with each of k side sites (k, P); without any, one for each surface
 
 
 def bend(

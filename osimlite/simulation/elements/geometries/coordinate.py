@@ -22,13 +22,9 @@ def coordinate(s: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class OnCoordinate(Geometry):
-    """A coordinate: value q (rad, m) and speed u; the output `force` is conjugate to the speed.
+    """A coordinate: value q (rad, m) and speed u; the output `force` is conjugate to the speed."""
 
-    Attributes:
-        field: that names the coordinate.
-    """
-
-    field: str = "coordinate"
+    field: str = "coordinate"  # that names the coordinate
 
     inputs = ("q", "u")
     speed = "u"

@@ -14,23 +14,16 @@ class Geometry:
 
     In the code of a kernel, `g` are the geometry's integers, `gp` its numbers and `room` its part of the record; `s`,
     `x`, `w`, `y`, `f` are as every kernel has them.
-
-    Attributes:
-        inputs: what it computes for a law, in the code before the law is called.
-        before: that code.
-        speed: name of the input with which an actuator's force, or its negative, makes a power.
-        along: the output that pushes along one displacement, which is the first input, its speed the second; and 1 if
-            it does so, -1 if it pulls. Empty if there is no such thing.
-        after: the code that applies the outputs of the law.
-        calls: the functions that both call.
     """
 
-    inputs: ClassVar[tuple[str, ...]] = ()
-    speed: ClassVar[str] = ""
-    before: ClassVar[tuple[str, ...]] = ()
+    inputs: ClassVar[tuple[str, ...]] = ()  # what it computes for a law, in the code before the law is called
+    speed: ClassVar[str] = ""  # name of the input with which an actuator's force, or its negative, makes a power
+    before: ClassVar[tuple[str, ...]] = ()  # that code
+    # the output that pushes along one displacement, which is the first input, its speed the second; and 1 if it does
+    # so, -1 if it pulls. Empty if there is no such thing.
     along: ClassVar[tuple[str, int]] = ("", 0)
-    after: ClassVar[tuple[str, ...]] = ()
-    calls: ClassVar[tuple[Callable[..., Any], ...]] = ()
+    after: ClassVar[tuple[str, ...]] = ()  # the code that applies the outputs of the law
+    calls: ClassVar[tuple[Callable[..., Any], ...]] = ()  # the functions that both call
 
     def functions(self) -> dict[str, Callable[..., Any]]:
         """What the code calls, by name."""

@@ -42,31 +42,20 @@ class Ends(NamedTuple):
 
     OpenSim takes the points as stations of the base bodies, also where a force names other frames; the points that it
     records are those of the frames.
-
-    Attributes:
-        frames: names of the frames in the record.
-        bodies: the two bodies.
-        points: stations in them, m.
-        recorded: stations in them that are recorded, m.
     """
 
-    frames: tuple[str, str]
-    bodies: tuple[int, int]
-    points: tuple[Triple, Triple]
-    recorded: tuple[Triple, Triple]
+    frames: tuple[str, str]  # names of the frames in the record
+    bodies: tuple[int, int]  # the two bodies
+    points: tuple[Triple, Triple]  # stations in them, m
+    recorded: tuple[Triple, Triple]  # stations in them that are recorded, m
 
 
 @dataclass(frozen=True)
 class BetweenPoints(Geometry):
-    """A line: length (m) and rate (m/s); the output `tension` (N) pulls its ends together.
+    """A line: length (m) and rate (m/s); the output `tension` (N) pulls its ends together."""
 
-    Attributes:
-        fields: that name the frames.
-        as_written: whether the record names the frames as the force does, and not by their names.
-    """
-
-    fields: tuple[str, str]
-    as_written: bool = False
+    fields: tuple[str, str]  # that name the frames
+    as_written: bool = False  # whether the record names the frames as the force does, and not by their names
 
     inputs = ("length", "rate")
     before = ("length, rate = line(s, w, g, gp, room)",)

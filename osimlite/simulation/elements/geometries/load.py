@@ -50,21 +50,13 @@ def turn_vector(s: Ints, w: Floats, link: int, axes: Floats, turning: Floats) ->
 
 
 class Load(NamedTuple):
-    """What acts, and where.
+    """What acts, and where."""
 
-    Attributes:
-        labels: of force, point and torque in the record; without the axes.
-        frame: where the force acts, if no point is given, and in which the point is recorded.
-        force_frame: along whose axes force and torque are.
-        point_frame: in which the point is.
-        force: three functions of time (N), or none; `point` (m) and `torque` (N.m) likewise.
-    """
-
-    labels: tuple[str, str, str]
-    frame: FramePlacement
-    force_frame: FramePlacement
-    point_frame: FramePlacement
-    force: Sequence[Function]
+    labels: tuple[str, str, str]  # of force, point and torque in the record; without the axes
+    frame: FramePlacement  # where the force acts, if no point is given, and in which the point is recorded
+    force_frame: FramePlacement  # along whose axes force and torque are
+    point_frame: FramePlacement  # in which the point is
+    force: Sequence[Function]  # three functions of time (N), or none; `point` (m) and `torque` (N.m) likewise
     point: Sequence[Function]
     torque: Sequence[Function]
 

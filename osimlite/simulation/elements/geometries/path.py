@@ -11,13 +11,9 @@ from osimlite.simulation.kernels.paths import path_length, pull_path
 
 
 class Path(Protocol):
-    """A path in terms of the mechanism.
+    """A path in terms of the mechanism."""
 
-    Attributes:
-        coupled: whether its moment arm about a coordinate takes in those that must move with that.
-    """
-
-    coupled: bool
+    coupled: bool  # whether its moment arm about a coordinate takes in those that must move with that
 
     def items(self, places: Places) -> list[Item]:
         """Parts, of which the last is the path's own; see :mod:`osimlite.simulation.kernels.paths`."""

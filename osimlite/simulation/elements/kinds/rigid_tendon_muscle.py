@@ -15,21 +15,13 @@ PARALLEL = 2.0**-26
 
 
 class RigidTendon(NamedTuple):
-    """The numbers of a muscle.
+    """The numbers of a muscle."""
 
-    Attributes:
-        strength: max_isometric_force, N.
-        optimal: optimal_fiber_length, m.
-        slack: tendon_slack_length, m.
-        fastest: max_contraction_velocity, 1/s.
-        height: of the fibers across the tendon, m.
-    """
-
-    strength: float
-    optimal: float
-    slack: float
-    fastest: float
-    height: float
+    strength: float  # max_isometric_force, N
+    optimal: float  # optimal_fiber_length, m
+    slack: float  # tendon_slack_length, m
+    fastest: float  # max_contraction_velocity, 1/s
+    height: float  # of the fibers across the tendon, m
 
 
 class RigidTendonCurves(NamedTuple):

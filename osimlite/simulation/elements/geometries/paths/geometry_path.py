@@ -36,27 +36,16 @@ TOLERANCE = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A point of a path.
+    """A point of a path."""
 
-    Attributes:
-        body: that it is in.
-        frame: (4, 4) in the body; the place is given there.
-        location: in the frame, m; what functions give comes on top.
-        kind: of the node.
-        coordinate: place in the mechanism of that which it depends on, or -1.
-        range: of this coordinate.
-        functions: of it, that give the place.
-        name: of the point, or of the surface that it is on.
-    """
-
-    body: int
-    frame: Array
-    location: Array
-    kind: int = FIXED
-    coordinate: int = -1
-    range: tuple[float, float] = (-inf, inf)
-    functions: tuple[Function, ...] = ()
-    name: str = ""
+    body: int  # that it is in
+    frame: Array  # (4, 4) in the body; the place is given there
+    location: Array  # in the frame, m; what functions give comes on top
+    kind: int = FIXED  # of the node
+    coordinate: int = -1  # place in the mechanism of that which it depends on, or -1
+    range: tuple[float, float] = (-inf, inf)  # of this coordinate
+    functions: tuple[Function, ...] = ()  # of it, that give the place
+    name: str = ""  # of the point, or of the surface that it is on
 
     def packed(self, places: Places, of: int, first: int, path: str, piece: int) -> tuple[list[int], list[float]]:
         """Its integers and numbers; these begin at `first`, and `of` is what the node belongs to.
@@ -77,44 +66,27 @@ class Node:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """What a path wraps around.
+    """What a path wraps around."""
 
-    Attributes:
-        number: tells it from other surfaces of the path.
-        tangent: a node at its middle, with its axes.
-        law: name of the law of the surface; empty if the surface is not active.
-        curve: name of the law that traces a path on it, which is no geodesic.
-        numbers: what the law is given, or those of :mod:`osimlite.simulation.kernels.geodesic_starts`.
-        first: number of the first point between which and the last one the path may wrap.
-        last: number of the last one.
-        begin: number of the first one of all pieces that the same PathWrap may bend.
-    """
-
-    number: int
-    tangent: Node
-    law: str
-    curve: str
-    numbers: tuple[float, ...]
-    first: int
-    last: int
-    begin: int = 0
+    number: int  # tells it from other surfaces of the path
+    tangent: Node  # a node at its middle, with its axes
+    law: str  # name of the law of the surface; empty if the surface is not active
+    curve: str  # name of the law that traces a path on it, which is no geodesic
+    numbers: tuple[float, ...]  # what the law is given, or those of `geodesic_starts`
+    first: int  # number of the first point between which and the last one the path may wrap
+    last: int  # number of the last one
+    begin: int = 0  # number of the first one of all pieces that the same PathWrap may bend
 
 
 @dataclass(frozen=True)
 class ThroughPoints:
-    """A path from point to point, around surfaces.
+    """A path from point to point, around surfaces."""
 
-    Attributes:
-        path: of its owner.
-        points: that it runs through.
-        surfaces: that it wraps around; along geodesics a surface for each point that a piece around it may begin at.
-        geodesic: whether it does so along geodesics.
-    """
-
-    path: str
-    points: tuple[Node, ...]
+    path: str  # of its owner
+    points: tuple[Node, ...]  # that it runs through
+    # that it wraps around; along geodesics a surface for each point that a piece around it may begin at
     surfaces: tuple[Surface, ...] = ()
-    geodesic: bool = False
+    geodesic: bool = False  # whether it does so along geodesics
 
     coupled: ClassVar[bool] = True
 

@@ -45,17 +45,11 @@ FIRST_STEP = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A point of a cable.
+    """A point of a cable."""
 
-    Attributes:
-        body: that it is in.
-        runs: station in the body that the cable runs through, m.
-        pulls: station in the body that it pulls at, m.
-    """
-
-    body: int
-    runs: Array
-    pulls: Array
+    body: int  # that it is in
+    runs: Array  # station in the body that the cable runs through, m
+    pulls: Array  # station in the body that it pulls at, m
 
     work: ClassVar[int] = POINT_WORK
     is_obstacle: ClassVar[bool] = False
@@ -69,19 +63,12 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
-    """A surface that a cable may touch.
+    """A surface that a cable may touch."""
 
-    Attributes:
-        body: that it is in.
-        frame: (4, 4) of the surface in the body.
-        surface: its numbers.
-        begin: how the cable is on it before a search.
-    """
-
-    body: int
-    frame: Array
-    surface: tuple[float, ...]
-    begin: Array
+    body: int  # that it is in
+    frame: Array  # (4, 4) of the surface in the body
+    surface: tuple[float, ...]  # its numbers
+    begin: Array  # how the cable is on it before a search
 
     work: ClassVar[int] = OBSTACLE_WORK
     is_obstacle: ClassVar[bool] = True
@@ -95,13 +82,9 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Cable:
-    """A path over obstacles.
+    """A path over obstacles."""
 
-    Attributes:
-        elements: points and obstacles in the order in which it passes them.
-    """
-
-    elements: tuple[Point | Obstacle, ...]
+    elements: tuple[Point | Obstacle, ...]  # points and obstacles in the order in which it passes them
 
     coupled: ClassVar[bool] = True
     trace: ClassVar[str] = "trace_cable"
