@@ -87,13 +87,25 @@ def derivatives_of_samples(
         orders: of the derivatives; 0 is the value.
         half_order: the splines are of degree 2 `half_order` - 1.
     """
-    points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    places, scale = _unit_spacing(points)
-    # What lies closer to the point before than rounding of the values would let a slope be found, says nothing.
-    kept = np.diff(places, prepend=-1.0) > TOUCHING
-    places, own = places[kept], (np.asarray(at, dtype=float) - points[0]) / scale
-    pieces = _pieces(places, values[kept], half_order)
-    return tuple(_derivative(places, pieces, own, order) / scale**order for order in orders)
+    return SampledCurves(x, y, half_order).derivatives(at, orders)
+
+
+class SampledCurves:
+    """Natural splines through the points of several columns; as of :func:`derivatives_of_samples`."""
+
+    def __init__(self, x: ArrayLike, y: ArrayLike, half_order: int = 3) -> None:
+        points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        places, self._scale = _unit_spacing(points)
+        # What lies closer to the point before than rounding of the values would let a slope be found, says nothing.
+        kept = np.diff(places, prepend=-1.0) > TOUCHING
+        self._start, self._places = points[0], places[kept]
+        self._pieces = _pieces(self._places, values[kept], half_order)
+
+    def derivatives(self, at: ArrayLike, orders: Sequence[int]) -> tuple[Array, ...]:
+        """Derivatives of some orders (k, m) at k places."""
+        own = (np.asarray(at, dtype=float) - self._start) / self._scale
+        found = ((order, _derivative(self._places, self._pieces, own, order)) for order in orders)
+        return tuple(values / self._scale**order for order, values in found)
 
 
 def _unit_spacing(points: Array) -> tuple[Array, float]:

@@ -38,16 +38,7 @@ def lowpassed(times: Array, values: Array, cutoff: float, *, limited: bool = Fal
     if len(times) < 2:
         raise SettingError("a low-pass filter needs a motion of two rows or more")
     count = len(times) // 2
-    times, values = _continued(times, count), _continued(values, count)
-    step = float(np.diff(times).min())
-    span = float(times[-1] - times[0])
-    if span / (len(times) - 1) - step > np.finfo(float).eps:
-        step = max(step, span / MOST_SAMPLES)
-        # Summed one by one, as OpenSim does it: it decides whether there is a last sample.
-        even = np.add.accumulate(np.r_[times[0], np.full(int(span / step) + 1, step)])
-        even = even[even <= times[-1]]
-        (values,) = derivatives_of_samples(times, values, even, (0,))
-        times = even
+    times, values, step = _even(continued(times, count), continued(values, count))
     if limited and cutoff * step >= 0.5:
         cutoff = 0.49 / step
     if cutoff * step >= 0.5:
@@ -58,10 +49,50 @@ def lowpassed(times: Array, values: Array, cutoff: float, *, limited: bool = Fal
     return times, _filtered(_filtered(values, cutoff * step)[::-1], cutoff * step)[::-1]
 
 
-def _continued(values: Array, count: int) -> Array:
-    """Values with `count` more at both ends, turned about the first and the last."""
-    before, after = values[count:0:-1], values[-2 : -2 - count : -1]
-    return np.concatenate([2.0 * values[0] - before, values, 2.0 * values[-1] - after])
+def lowpassed_by_sinc(times: Array, values: Array, cutoff: float, order: int) -> tuple[Array, Array]:
+    """A record through the filter of OpenSim's tracking tools: a sinc of its cut-off under Hamming's window.
+
+    Args:
+        times: (t,), s, increasing.
+        values: (t, n).
+        cutoff: frequency, Hz.
+        order: so many samples on both sides count.
+
+    Returns:
+        Times (s,), evenly spaced, and values (s, n). A record that is too short is returned as it is, as in OpenSim.
+    """
+    times, values, step = _even(times, values)
+    if len(times) < 2 * order:
+        return times, values
+    k = np.arange(-order, order + 1)
+    weights = np.sinc(2.0 * cutoff * step * k) * (0.54 + 0.46 * np.cos(np.pi * k / order))
+    weights /= weights.sum()
+    padded = continued(values, order)
+    return times, np.column_stack([np.convolve(column, weights, "valid") for column in padded.T])
+
+
+def _even(times: Array, values: Array) -> tuple[Array, Array, float]:
+    """A record at even times, and the step between these."""
+    step = float(np.diff(times).min())
+    span = float(times[-1] - times[0])
+    if span / (len(times) - 1) - step > np.finfo(float).eps:
+        step = max(step, span / MOST_SAMPLES)
+        # Summed one by one, as OpenSim does it: it decides whether there is a last sample.
+        even = np.add.accumulate(np.r_[times[0], np.full(int(span / step) + 1, step)])
+        even = even[even <= times[-1]]
+        (values,) = derivatives_of_samples(times, values, even, (0,))
+        times = even
+    return times, values, step
+
+
+def continued(values: Array, count: int) -> Array:
+    """Values with `count` more at both ends, turned about the first and the last; of a short record several times."""
+    while count > 0:
+        more = min(count, len(values) - 1)
+        before, after = values[more:0:-1], values[-2 : -2 - more : -1]
+        values = np.concatenate([2.0 * values[0] - before, values, 2.0 * values[-1] - after])
+        count -= more
+    return values
 
 
 def _filtered(values: Array, cutoff: float) -> Array:

@@ -201,20 +201,50 @@ class StaticOptimization:
         needed = (needed[:, None, :] @ turned)[:, 0]
         result, lacking, solved = self._least(pushes @ turned, needed)
         result[~solved] = np.nan
-        own = [1.0 if isinstance(item, Muscle) else item.optimal_force for item in self._actuators]
-        return Shared(times, self.names, result, strengths * own, self.coordinates, lacking, solved)
+        return Shared(times, self.names, result, strengths * self.optimal_forces, self.coordinates, lacking, solved)
 
     def _least(self, columns: Array, needed: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Activations (t, a), what is missing (t, m), and whether nothing is (t,), for columns (t, a, m)."""
-        frames, count, size = columns.shape
-        code = best()
-        code.make_ready(("least_effort",))
-        sizes = np.array([frames, size, count, *[0] * (count * (size + 1))], dtype=np.int64)
-        numbers = np.array([self._exponent, *self._bounds.ravel()])
-        given = np.ascontiguousarray(np.hstack([columns.reshape(frames, -1), needed]))
-        result = np.zeros((frames, count + size + 1))
-        code.entry("least_effort")(sizes, numbers, given, result, np.zeros(effort_room(size, count)))
-        return result[:, :count], result[:, count:-1], result[:, -1] == 1.0
+        return least_effort(columns, needed, self._exponent, self._bounds)
+
+    @property
+    def optimal_forces(self) -> Array:
+        """What each actuator pushes with by a control of 1 (a,), N or N m; of muscles with fibers 1."""
+        fibers = [isinstance(item, Muscle) for item in self._actuators]
+        return np.array([1.0 if own else item.optimal_force for own, item in zip(fibers, self._actuators, strict=True)])
+
+    def strengths(self, times: Array, values: Array, speeds: Array) -> Array:
+        """What each actuator pushes with by a control of 1 in one pose (a,), N or N m."""
+        moments = np.column_stack([times, self._system.state.rows(values, speeds)])
+        at_rest = np.zeros((len(times), len(self._system.order)))
+        _, _, strengths = self._system.pushed(moments, at_rest, self._paths)
+        return (strengths * self.optimal_forces)[0]
+
+    def balanced(self, times: Array, values: Array, speeds: Array, accelerations: Array) -> Array:
+        """Forces (t, a), within no bounds, that give accelerations (t, n) with the least squares of controls."""
+        system, order = self._system, list(self._system.order)
+        udot, ways = self._allowed(times, values, speeds, accelerations)
+        moments = np.column_stack([times, system.state.rows(values, speeds)])
+        needed, pushes, _ = system.pushed(moments, np.ascontiguousarray(udot[:, order]), self._paths)
+        turned = ways[:, order]
+        shared = np.linalg.pinv((pushes @ turned).transpose(0, 2, 1)) @ (needed[:, None, :] @ turned).transpose(0, 2, 1)
+        result: Array = shared[..., 0] * self.optimal_forces
+        return result
+
+    def responses(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array]:
+        """Accelerations of all coordinates in one pose, without actuators (n,) and by each force of 1 (n, a)."""
+        system, order = self._system, list(self._system.order)
+        udot, ways = self._allowed(times, values, speeds, np.zeros_like(values))
+        moments = np.column_stack([times, system.state.rows(values, speeds)])
+        needed, pushes, _ = system.pushed(moments, np.ascontiguousarray(udot[:, order]), self._paths)
+        size = len(order)
+        # What accelerations of one coordinate take beyond those of none: the mass matrix.
+        tried = np.vstack([np.zeros(size), np.eye(size)])
+        taken = system.missing(np.repeat(moments, size + 1, axis=0), tried)
+        turned = ways[0]
+        mass = turned[order].T @ (taken[1:] - taken[0]).T @ turned[order]
+        right = np.column_stack([-needed[0], (pushes[0] / self.optimal_forces[:, None]).T])
+        found = turned @ np.linalg.solve(mass, turned[order].T @ right)
+        return udot[0] + found[:, 0], found[:, 1:]
 
     def _allowed(self, times: Array, values: Array, speeds: Array, wanted: Array) -> tuple[Array, Array]:
         """Accelerations (t, n) that the constraints allow, and what moves with each free coordinate (t, n, m).
@@ -283,6 +313,31 @@ class StaticOptimization:
         own = [column for column, path in enumerate(owners) if path in places]
         rows[:, own] = shared.forces[:, [places[owners[column]] for column in own]]
         return StoTable(FORCES_TITLE, shared.times, tuple(labels), rows)
+
+
+def least_effort(
+    columns: Array, needed: Array, exponent: float, bounds: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """The least sum of |x|ᵖ that gives what is needed, frame by frame.
+
+    Args:
+        columns: of each frame what each entry of x gives (t, a, m).
+        needed: (t, m).
+        exponent: p.
+        bounds: of x, lower and upper (2, a).
+
+    Returns:
+        x (t, a), what is missing (t, m), and whether nothing is (t,).
+    """
+    frames, count, size = columns.shape
+    code = best()
+    code.make_ready(("least_effort",))
+    sizes = np.array([frames, size, count, *[0] * (count * (size + 1))], dtype=np.int64)
+    numbers = np.array([exponent, *bounds.ravel()])
+    given = np.ascontiguousarray(np.hstack([columns.reshape(frames, -1), needed]))
+    result = np.zeros((frames, count + size + 1))
+    code.entry("least_effort")(sizes, numbers, given, result, np.zeros(effort_room(size, count)))
+    return result[:, :count], result[:, count:-1], result[:, -1] == 1.0
 
 
 def _idealised(model: Model, physiology: bool) -> list[ScalarActuator]:

@@ -98,6 +98,7 @@ class System:
         self.state = StateLayout(mechanism, self.order, forces.elements)
         self.probes = tuple(item for item in forces.elements if isinstance(item, DeclaredProbe))
         self._controls = forces.controls
+        self._driven_by: object = None
         self._bind()
 
     def renumbered(self, mechanism: Mechanism, forces: Forces, numbers: Floats) -> Self:
@@ -120,8 +121,14 @@ class System:
         if controls is self._controls or not place:
             return
         own, numbers, kernel = controls.record()
-        self.structure = np.concatenate((self.structure[: place + ITEM.OWN], np.array(own, dtype=np.int64)))
         first = self.structure[place + ITEM.NUMBERS]
+        if self._driven_by == (own, len(numbers), kernel):
+            # Other numbers in the same places, of which whoever runs the kernels need not be told.
+            self.numbers[first:] = numbers
+            self._controls = controls
+            return
+        self._driven_by = own, len(numbers), kernel
+        self.structure = np.concatenate((self.structure[: place + ITEM.OWN], np.array(own, dtype=np.int64)))
         self.numbers = np.concatenate((self.numbers[:first], np.array(numbers, dtype=np.float64)))
         self.program.drive(self.structure, kernel)
         self._bind()

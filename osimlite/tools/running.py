@@ -26,6 +26,9 @@ from osimlite.tools.job import Job
 from osimlite.tools.not_runnable import NotRunnable
 from osimlite.tools.outcome import Outcome
 
+IGNORED = ("OSIM101",)
+"""Errors that OpenSim runs a setup with: properties that it does not know, such as those of other versions."""
+
 
 class FaultySetup(DocumentError):
     """A setup, or what it names, has errors.
@@ -78,11 +81,11 @@ def run(
     if check:
         away: dict[str, None] = {}
         report = merged(_reports(str(file), away))
-        if report.errors:
-            raise FaultySetup(report)
+        if errors := [found for found in report.errors if found.code not in IGNORED]:
+            raise FaultySetup(Report(errors, report.texts))
         if away:
             outcome.tell("taken from here", f"{listed(away)}, not beside the setup")
-        outcome.warnings = sorted(report.warnings, key=lambda found: found.suggestion is None)
+        outcome.warnings = sorted(report.errors + report.warnings, key=lambda found: found.suggestion is None)
         misspelt = [found for found in outcome.warnings if found.suggestion is not None]
         if tell is not None and misspelt:
             tell(Report(misspelt, report.texts))

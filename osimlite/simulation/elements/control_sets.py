@@ -13,7 +13,7 @@ from osimlite.errors import ModelError
 from osimlite.multibody.functions import Constant, Function, PiecewiseConstant
 from osimlite.multibody.smoothing_spline import PiecewisePolynomial
 from osimlite.records import dataclass
-from osimlite.schema.control_sets import Control, ControlConstant, ControlLinear, ControlSet
+from osimlite.schema.control_sets import Control, ControlConstant, ControlLinear, ControlLinearNode, ControlSet
 from osimlite.simulation.elements.control_tables import read_controls
 
 
@@ -67,7 +67,16 @@ def _curve(control: Control, file: str) -> Function:
     assert isinstance(control, ControlLinear)
     if not control.x_nodes:
         raise ModelError(f"the control '{control.name}' has no x_nodes; give it some", file=file)
-    times, values = [node.t for node in control.x_nodes], [node.value for node in control.x_nodes]
+    return node_curve(control, control.x_nodes, file)
+
+
+def node_curve(control: ControlLinear, nodes: Sequence[ControlLinearNode], file: str | None = None) -> Function:
+    """Lines or steps through nodes of a control, such as its x_nodes.
+
+    Raises:
+        ModelError: their times go back.
+    """
+    times, values = [node.t for node in nodes], [node.value for node in nodes]
     if not np.isfinite([*times, *values]).all() or (np.diff(times) < 0.0).any():
         raise ModelError(
             f"the x_nodes of the control '{control.name}' go back in time, or have no numbers; sort them", file=file

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 LARGEST = 1e25
 """No coordinate (rad or m) is larger: what follows of such numbers is none."""
+ALIKE = 1e-6
+"""Values (rad or m) at one time that differ by less are the same."""
 _HALF_ORDER = 3
 """OpenSim differentiates coordinates by splines of fifth degree."""
 
@@ -176,6 +178,11 @@ class RecordedMotion(Movement):
                 f"{listed(mechanism.coordinate_names)}",
                 file=table.file,
             )
+        close = (np.abs(np.diff(values, axis=0)) < ALIKE).all(axis=1)
+        if len(again := np.flatnonzero((np.diff(table.times) == 0.0) & close)):
+            # OpenSim's tools end a motion with two rows that are at one time once they are printed.
+            table = replace(table, times=np.delete(table.times, again), rows=np.delete(table.rows, again, axis=0))
+            values = np.delete(values, again, axis=0)
         late = np.flatnonzero(np.diff(table.times) <= 0.0)
         if len(late):
             raise DocumentError(

@@ -1,0 +1,66 @@
+"""OpenSim's RootSolver: zeros of functions that do not depend on one another, all at once.
+
+Each is bracketed, and found by inverse quadratic interpolation or bisection (R. P. Brent, Algorithms for Minimization
+without Derivatives, 1973, chapter 4). What OpenSim calls a zero is as far from one as its tolerance lets it be: so its
+steps are taken here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from osimlite.multibody.spatial import Array
+
+ROUNDING = 2.0 * float(np.finfo(float).eps)
+
+
+def roots(function: Callable[[Array], Array], low: Array, high: Array, tolerance: float) -> Array:
+    """Zeros (n,) of n functions, each of its own argument, between two arguments; an end where there is none."""
+    a, b = low.astype(float), high.astype(float)
+    fa, fb = function(a), function(b)
+    c, fc = a.copy(), fa.copy()
+    open_ = np.ones(len(a), dtype=bool)
+    while True:
+        step = np.zeros(len(a))
+        for i in np.flatnonzero(open_).tolist():
+            if (fb[i] > 0.0 and fc[i] > 0.0) or (fb[i] < 0.0 and fc[i] < 0.0):
+                c[i], fc[i] = a[i], fa[i]
+            before = b[i] - a[i]
+            if abs(fc[i]) < abs(fb[i]):
+                a[i], b[i] = b[i], c[i]
+                c[i] = a[i]
+                fa[i], fb[i] = fb[i], fc[i]
+                fc[i] = fa[i]
+            near = ROUNDING * abs(b[i]) + 0.5 * tolerance
+            new = 0.5 * (c[i] - b[i])
+            if abs(new) <= near or fb[i] == 0.0:
+                open_[i] = False
+                continue
+            if abs(before) >= near and abs(fa[i]) > abs(fb[i]):
+                new = _interpolated(a[i], b[i], c[i], fa[i], fb[i], fc[i], before, near, new)
+            if abs(new) < near:
+                new = near if new > 0.0 else -near
+            a[i], fa[i] = b[i], fb[i]
+            step[i] = new
+        if not open_.any():
+            return b
+        b = b + step
+        fb = function(b)
+
+
+def _interpolated(
+    a: float, b: float, c: float, fa: float, fb: float, fc: float, before: float, near: float, half: float
+) -> float:
+    """The step to where a line or a parabola through what is known is zero, if it is short enough; else a half."""
+    width = c - b
+    if a == c:
+        ratio = fb / fa
+        p, q = width * ratio, 1.0 - ratio
+    else:
+        q, t1, t2 = fa / fc, fb / fc, fb / fa
+        p = t2 * (width * q * (q - t1) - (b - a) * (t1 - 1.0))
+        q = (q - 1.0) * (t1 - 1.0) * (t2 - 1.0)
+    p, q = (p, -q) if p > 0.0 else (-p, q)
+    return p / q if p < 0.75 * width * q - 0.5 * abs(near * q) and p < abs(0.5 * before * q) else half
