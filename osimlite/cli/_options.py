@@ -77,6 +77,21 @@ Controls = Annotated[
     ),
 ]
 Numbers = Annotated[str, Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")]
+Format = Annotated[str, Option("--format", metavar="FORMAT", help="full, concise, json, github, sarif or junit.")]
+Select = Annotated[
+    list[str] | None,
+    Option(metavar="RULE", help="Run only these rules: codes, beginnings of codes (OSIM3), names.", show_default=False),
+]
+Ignore = Annotated[
+    list[str] | None, Option(metavar="RULE", help="Leave these rules out; as for --select.", show_default=False)
+]
+FailOn = Annotated[
+    str | None,
+    Option(metavar="SEVERITY", help="What makes the exit code 1: error, warning or info.", show_default=False),
+]
+Everything = Annotated[
+    bool, Option("--all", help="Print every finding; else the first stands for those that are like it.")
+]
 OnlyOurs = Annotated[
     bool, Option("--skip-other-xml", help="Pass over XML that is not OpenSim's, also where it is named.")
 ]

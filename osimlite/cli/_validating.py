@@ -47,10 +47,7 @@ def run(
     only_ours: bool = False,
 ) -> int:
     """Check files and folders, write the report to standard output, and return the exit code."""
-    if fail_on is not None and fail_on not in tuple(Severity):
-        raise OsimliteError(f"--fail-on is one of {listed(Severity)}, not '{fail_on}'")
-    if format not in FORMATS:
-        raise OsimliteError(f"--format is one of {listed(FORMATS)}, not '{format}'")
+    expect_known(format, fail_on)
     given = Config(
         checked_words(select),
         checked_words(ignore),
@@ -98,6 +95,17 @@ def run(
         (show if format in FOR_PEOPLE else hand_over)(text)
     worst = Severity(fail_on) if fail_on is not None else _fail_on_of(files)
     return 2 if failed else int(bool(report.at_least(worst)))
+
+
+def expect_known(format: str, fail_on: str | None) -> None:
+    """Refuse words of --format and --fail-on that are none.
+
+    Raises:
+        OsimliteError: one is not.
+    """
+    for option, word, known in (("--fail-on", fail_on, tuple(Severity)), ("--format", format, FORMATS)):
+        if word is not None and word not in known:
+            raise OsimliteError(f"{option} is one of {listed(known)}, not '{word}'")
 
 
 def _source(path: str) -> Source:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from osimlite.cli._command import Argument, Option, command
+from osimlite.cli import _options as options
+from osimlite.cli._command import Argument, command
 
 if TYPE_CHECKING:
     from osimlite.tools.trials.check import TrialReport
@@ -21,26 +22,11 @@ def check_trial(
             show_default=False,
         ),
     ],
-    format: Annotated[
-        str, Option("--format", metavar="FORMAT", help="full, concise, json, github, sarif or junit.")
-    ] = "full",
-    select: Annotated[
-        list[str] | None,
-        Option(
-            metavar="RULE", help="Run only these rules: codes, beginnings of codes (OSIM3), names.", show_default=False
-        ),
-    ] = None,
-    ignore: Annotated[
-        list[str] | None,
-        Option(metavar="RULE", help="Leave these rules out; as for --select.", show_default=False),
-    ] = None,
-    fail_on: Annotated[
-        str | None,
-        Option(metavar="SEVERITY", help="What makes the exit code 1: error, warning or info.", show_default=False),
-    ] = None,
-    everything: Annotated[
-        bool, Option("--all", help="Print every finding; else the first stands for those that are like it.")
-    ] = False,
+    format: options.Format = "full",
+    select: options.Select = None,
+    ignore: options.Ignore = None,
+    fail_on: options.FailOn = None,
+    everything: options.Everything = False,
 ) -> None:
     """Say whether a finished trial is good enough: is the model strong enough, are the data good?
 
@@ -56,18 +42,13 @@ def check_trial(
     """
     from osimlite.cli._console import hand_over, show, wants_colour
     from osimlite.cli._progress import progress_bar
-    from osimlite.cli._validating import terminal_width
-    from osimlite.errors import OsimliteError
+    from osimlite.cli._validating import expect_known, terminal_width
     from osimlite.lint.diagnostic import Severity
-    from osimlite.lint.reporters import FOR_PEOPLE, FORMATS, render
+    from osimlite.lint.reporters import FOR_PEOPLE, render
     from osimlite.records import replace
-    from osimlite.text import listed
     from osimlite.tools.trials.check import check_trial as check
 
-    if fail_on is not None and fail_on not in tuple(Severity):
-        raise OsimliteError(f"--fail-on is one of {listed(Severity)}, not '{fail_on}'")
-    if format not in FORMATS:
-        raise OsimliteError(f"--format is one of {listed(FORMATS)}, not '{format}'")
+    expect_known(format, fail_on)
     with progress_bar("checking", None) as progress:
         report = check(*paths, select=select, ignore=ignore, progress=lambda done, of: progress(done, of))
     if format == "json":

@@ -18,23 +18,10 @@ def validate(
             show_default=False,
         ),
     ],
-    format: Annotated[
-        str, Option("--format", metavar="FORMAT", help="full, concise, json, github, sarif or junit.")
-    ] = "full",
-    select: Annotated[
-        list[str] | None,
-        Option(
-            metavar="RULE", help="Run only these rules: codes, beginnings of codes (OSIM3), names.", show_default=False
-        ),
-    ] = None,
-    ignore: Annotated[
-        list[str] | None,
-        Option(metavar="RULE", help="Leave these rules out; as for --select.", show_default=False),
-    ] = None,
-    fail_on: Annotated[
-        str | None,
-        Option(metavar="SEVERITY", help="What makes the exit code 1: error, warning or info.", show_default=False),
-    ] = None,
+    format: options.Format = "full",
+    select: options.Select = None,
+    ignore: options.Ignore = None,
+    fail_on: options.FailOn = None,
     fix: Annotated[bool, Option("--fix", help="Mend what can be mended with certainty.")] = False,
     unsafe_fixes: Annotated[
         bool, Option("--unsafe-fixes", help="Mend also what was probably meant; look at it with --diff first.")
@@ -57,9 +44,7 @@ def validate(
             metavar="RELEASE", help="The OpenSim that is to read the files: 4.0 to 4.6 (OSIM113).", show_default="4.6"
         ),
     ] = "",
-    everything: Annotated[
-        bool, Option("--all", help="Print every finding; else the first stands for those that are like it.")
-    ] = False,
+    everything: options.Everything = False,
     statistics: Annotated[bool, Option("--statistics", help="Count findings by rule instead.")] = False,
     stdin_filename: Annotated[
         str | None,
