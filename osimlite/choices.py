@@ -10,44 +10,26 @@ from osimlite.records import field
 
 
 class Choice(NamedTuple):
-    """An option.
+    """An option."""
 
-    Attributes:
-        name: the keyword of the library; on the command line with - for _, unless `spelled` says otherwise.
-        type: of its value.
-        help: one sentence.
-        default: if it is left out.
-        unit: what the value is, in capitals, as SECONDS.
-        shown: the default in words, where `default` does not tell it.
-        group: under which heading of the help it stands.
-        spelled: on the command line.
-    """
-
-    name: str
-    type: Any
-    help: str
-    default: Any = None
-    unit: str = ""
-    shown: str = ""
-    group: str = ""
-    spelled: tuple[str, ...] = ()
+    name: str  # the keyword of the library; on the command line with - for _, unless `spelled` says otherwise
+    type: Any  # of its value
+    help: str  # one sentence
+    default: Any = None  # if it is left out
+    unit: str = ""  # what the value is, in capitals, as SECONDS
+    shown: str = ""  # the default in words, where `default` does not tell it
+    group: str = ""  # under which heading of the help it stands
+    spelled: tuple[str, ...] = ()  # on the command line
 
 
 class Said(NamedTuple):
-    """What is said of an attribute of a record that is an option of a function.
+    """What is said of an attribute of a record that is an option of a function."""
 
-    Attributes:
-        help: one sentence for the command line; an option without one is not there.
-        more: for the library, after that or instead of it.
-        unit: as of :class:`Choice`, so too `shown`.
-        type: of what is written on the command line, where that is less than the library takes.
-    """
-
-    help: str
-    more: str
-    unit: str
+    help: str  # one sentence for the command line; an option without one is not there
+    more: str  # for the library, after that or instead of it
+    unit: str  # as of `Choice`, so too `shown`
     shown: str
-    type: Any
+    type: Any  # of what is written on the command line, where that is less than the library takes
 
 
 def option(default: Any, help: str = "", *, more: str = "", unit: str = "", shown: str = "", type: Any = None) -> Any:

@@ -23,17 +23,12 @@ NEARLY = 1e-16
 
 
 class Measured(NamedTuple):
-    """What measurements come to.
+    """What measurements come to."""
 
-    Attributes:
-        factors: along the three axes of every physical frame, by their names in the order of the model.
-        ratios: of each measurement that counts, measured to model, by name.
-        notes: what was left out, and why.
-    """
-
+    # along the three axes of every physical frame, by their names in the order of the model
     factors: dict[str, list[float]]
-    ratios: dict[str, float]
-    notes: list[str]
+    ratios: dict[str, float]  # of each measurement that counts, measured to model, by name
+    notes: list[str]  # what was left out, and why
 
 
 class Measuring:

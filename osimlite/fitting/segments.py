@@ -23,17 +23,12 @@ class Segment(NamedTuple):
 
 
 class Segments(NamedTuple):
-    """The scale factors of the bodies of a model, as few numbers (k,).
+    """The scale factors of the bodies of a model, as few numbers (k,)."""
 
-    Attributes:
-        parts: whose factor each number is.
-        alike: pairs of lists of numbers whose means are much the same: segments that hang on one another.
-        sides: pairs of a number and the list of all numbers of its segment.
-    """
-
-    parts: tuple[Segment, ...]
+    parts: tuple[Segment, ...]  # whose factor each number is
+    # pairs of lists of numbers whose means are much the same: segments that hang on one another
     alike: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
-    sides: tuple[tuple[int, tuple[int, ...]], ...]
+    sides: tuple[tuple[int, tuple[int, ...]], ...]  # pairs of a number and the list of all numbers of its segment
 
     @classmethod
     def of(cls, carriers: Mapping[str, str], marked: Collection[str], *, by_axis: bool, symmetric: bool) -> Segments:

@@ -28,17 +28,12 @@ AXES = "xyz"
 
 
 class PlacedSensors(NamedTuple):
-    """Sensors that were put onto a model.
+    """Sensors that were put onto a model."""
 
-    Attributes:
-        names: of the sensors.
-        left_out: names of those of the data for which the model has no frame.
-        heading: angle about the vertical by which the data were turned so that the base faces where the model does
-            (rad), None if they were not.
-    """
-
-    names: tuple[str, ...]
-    left_out: tuple[str, ...]
+    names: tuple[str, ...]  # of the sensors
+    left_out: tuple[str, ...]  # names of those of the data for which the model has no frame
+    # angle about the vertical by which the data were turned so that the base faces where the model does (rad), None
+    # if they were not
     heading: float | None
 
 

@@ -112,13 +112,10 @@ class Reach(NamedTuple):
 
 
 class Measures(NamedTuple):
-    """What is measured of a model.
+    """What is measured of a model."""
 
-    Attributes:
-        swept: for each path the places in the mechanism of the coordinates that change its length; in what poses a path
-            is looked at, those of all paths say.
-    """
-
+    # for each path the places in the mechanism of the coordinates that change its length; in what poses a path is
+    # looked at, those of all paths say
     swept: dict[str, tuple[int, ...]]
     wrappings: list[Wrapping]
     jumps: list[Jump]

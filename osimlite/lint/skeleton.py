@@ -74,17 +74,13 @@ class _Edge(NamedTuple):
 
 
 class Growth(NamedTuple):
-    """How OpenSim makes a tree of the bodies of a skeleton.
+    """How OpenSim makes a tree of the bodies of a skeleton."""
 
-    Attributes:
-        loops: the joints that close loops, in the order of the joints.
-        fails: whether it refuses the model, or crashes, for the bodies that no joint connects to ground. It gives each
-            of them, or one of each group, a joint to ground. With each joint that it makes it forgets the order of all
-            joints before, which it then adds to the system last, in the order of the document: too late for offset
-            frames, and for joints, on the bodies that they carry.
-    """
-
-    loops: list[Link]
+    loops: list[Link]  # the joints that close loops, in the order of the joints
+    # whether it refuses the model, or crashes, for the bodies that no joint connects to ground. It gives each of
+    # them, or one of each group, a joint to ground. With each joint that it makes it forgets the order of all joints
+    # before, which it then adds to the system last, in the order of the document: too late for offset frames, and for
+    # joints, on the bodies that they carry.
     fails: bool
 
 

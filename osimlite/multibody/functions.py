@@ -146,16 +146,11 @@ class Step(Univariate):
 
 @dataclass(frozen=True)
 class MultivariatePolynomial(Function):
-    """The sum of `coefficients` times monomials of all arguments.
+    """The sum of `coefficients` times monomials of all arguments."""
 
-    Attributes:
-        coefficients: one for each monomial.
-        powers: of each argument in each monomial.
-        opensim_derivatives: give for the Hessian what OpenSim 4.6 takes for it, which is the gradient in every column.
-    """
-
-    coefficients: tuple[float, ...]
-    powers: tuple[tuple[int, ...], ...]
+    coefficients: tuple[float, ...]  # one for each monomial
+    powers: tuple[tuple[int, ...], ...]  # of each argument in each monomial
+    # give for the Hessian what OpenSim 4.6 takes for it, which is the gradient in every column
     opensim_derivatives: bool = False
 
     @classmethod

@@ -147,21 +147,15 @@ class Mobilizer:
     The joint says T_PC = X_PF X_FM(q) X_CM⁻¹ for its parent P and child C; `motions` are the factors of X_FM.
     `reversed` tells that the joint's child carries its parent in the tree: nothing else changes, the speeds
     still are those of M in F.
-
-    Attributes:
-        joint: absolute path of the joint.
-        joint_type: OpenSim's class name of the joint, for messages.
-        motions: factors of X_FM.
-        coordinates: index in the mechanism of each of the joint's coordinates.
-        parent_frame: X_PF (4, 4), the joint's parent frame in its body (or ground).
-        child_frame: X_CM (4, 4), the joint's child frame in its body (or ground).
     """
 
-    joint: str
-    joint_type: str
-    motions: tuple[Motion, ...]
-    coordinates: tuple[int, ...] = ()
+    joint: str  # absolute path of the joint
+    joint_type: str  # OpenSim's class name of the joint, for messages
+    motions: tuple[Motion, ...]  # factors of X_FM
+    coordinates: tuple[int, ...] = ()  # index in the mechanism of each of the joint's coordinates
+    # X_PF (4, 4), the joint's parent frame in its body (or ground)
     parent_frame: Array = field(default_factory=transform)
+    # X_CM (4, 4), the joint's child frame in its body (or ground)
     child_frame: Array = field(default_factory=transform)
     reversed: bool = False
 

@@ -36,25 +36,20 @@ class MassProperties:
 
 @dataclass(frozen=True)
 class CoordinateInfo:
-    """What the model says of one coordinate (rad or m, and per second).
-
-    Attributes:
-        joint: path of its joint.
-        prescribed: its value as a function of time (s), or None; a locked coordinate keeps its value all the same.
-        yielding: assembling a pose moves it as the constraints like, instead of as little as it can.
-    """
+    """What the model says of one coordinate (rad or m, and per second)."""
 
     name: str
     path: str
-    joint: str
+    joint: str  # path of its joint
     motion_type: MotionType
     default_value: float = 0.0
     default_speed: float = 0.0
     range: tuple[float, float] = (-10.0, 10.0)
     clamped: bool = False
     locked: bool = False
+    # its value as a function of time (s), or None; a locked coordinate keeps its value all the same
     prescribed: Function | None = None
-    yielding: bool = False
+    yielding: bool = False  # assembling a pose moves it as the constraints like, instead of as little as it can
 
     @property
     def unit(self) -> str:

@@ -19,15 +19,11 @@ from osimlite.simulation.elements.control_tables import read_controls
 
 @dataclass(frozen=True)
 class ControlCurves:
-    """The controls of a file.
+    """The controls of a file."""
 
-    Attributes:
-        curves: functions of time by the names of the controls; of several controls of a name the first.
-        of_model: the names of those that the model is to have.
-    """
-
+    # functions of time by the names of the controls; of several controls of a name the first
     curves: Mapping[str, Function]
-    of_model: Sequence[str]
+    of_model: Sequence[str]  # the names of those that the model is to have
 
     @classmethod
     def read(cls, path: Path) -> ControlCurves:

@@ -25,16 +25,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Controls:
-    """All controls: for each of them the functions of time whose sum it is.
+    """All controls: for each of them the functions of time whose sum it is."""
 
-    Attributes:
-        names: paths of the actuators in the order of the model; of one with several controls with `_0`, `_1` ...
-            behind it, as OpenSim's tools call them.
-        functions: of each.
-    """
-
+    # paths of the actuators in the order of the model; of one with several controls with `_0`, `_1` ... behind it, as
+    # OpenSim's tools call them.
     names: tuple[str, ...] = ()
-    functions: tuple[tuple[Function, ...], ...] = ()
+    functions: tuple[tuple[Function, ...], ...] = ()  # of each
 
     def driven(self, more: Mapping[str, Function]) -> Controls:
         """With a function added to some of them, by name."""
@@ -73,17 +69,12 @@ class Reflex(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """What a controller does to an actuator.
+    """What a controller does to an actuator."""
 
-    Attributes:
-        actuator: the component.
-        signal: what it adds to a control, or the error that says why that cannot be computed.
-        number: of the control among those of the actuator; of the only one if left out.
-    """
-
-    actuator: Any
+    actuator: Any  # the component
+    # what it adds to a control, or the error that says why that cannot be computed
     signal: Function | Reflex | UnsupportedError
-    number: int | None = None
+    number: int | None = None  # of the control among those of the actuator; of the only one if left out
 
 
 class ModelControls:

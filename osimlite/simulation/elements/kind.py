@@ -63,50 +63,36 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """A kind of force.
+    """A kind of force."""
 
-    Attributes:
-        component: class of the forces.
-        geometry: where they act.
-        law: computes the outputs.
-        outputs: names of the results of the law: what the geometry applies, rates of states, what is recorded.
-        parameters: what the law is given of a component; a name stands for a property that is a number.
-        inputs: which of the geometry's inputs the law is given; all if None.
-        kept: which of them, and of the derivatives of states, are recorded too.
-        controlled: whether the law is given the control, or the controls if there are several.
-        states: of each force.
-        together: named tuple as which the law is given inputs, excitation and states; one by one if None.
-        equilibrium: computes states in equilibrium from what the law is given: whether it found them, and those that
-            `settled` names.
-        settled: names of the states that it finds.
-        rigid: force (N) of fully active fibers along a rigid tendon, from what the law is given; of muscles.
-        told: what is said of a force whose law, or equilibrium, has no solution, from what is `known` of it.
-        labels: of the record, in which {name} stands for that of the force, each with its output; the geometry's own if
-            None.
-        stored: energy (J) of a force from its record, where it is no output of the law.
-        check: raises a ModelError if the parameters have no meaning together.
-        shares: whether a force may have numbers of others of its class.
-        goes_on: whether the states of a force that is off (appliesForce) change as those of others do; else they rest.
-    """
-
-    component: type
-    geometry: Geometry
-    law: Callable[..., Any] | None = None
+    component: type  # class of the forces
+    geometry: Geometry  # where they act
+    law: Callable[..., Any] | None = None  # computes the outputs
+    # names of the results of the law: what the geometry applies, rates of states, what is recorded
     outputs: tuple[str, ...] = ()
+    # what the law is given of a component; a name stands for a property that is a number
     parameters: Sequence[str | Parameter] = ()
-    inputs: tuple[str, ...] | None = None
-    kept: tuple[str, ...] = ()
-    controlled: bool = False
-    states: tuple[State, ...] = ()
+    inputs: tuple[str, ...] | None = None  # which of the geometry's inputs the law is given; all if None
+    kept: tuple[str, ...] = ()  # which of them, and of the derivatives of states, are recorded too
+    controlled: bool = False  # whether the law is given the control, or the controls if there are several
+    states: tuple[State, ...] = ()  # of each force
+    # named tuple as which the law is given inputs, excitation and states; one by one if None
     together: type[Any] | None = None
+    # computes states in equilibrium from what the law is given: whether it found them, and those that `settled` names
     equilibrium: Callable[..., Any] | None = None
-    settled: tuple[str, ...] = ()
+    settled: tuple[str, ...] = ()  # names of the states that it finds
+    # force (N) of fully active fibers along a rigid tendon, from what the law is given; of muscles
     rigid: Callable[..., float] | None = None
+    # what is said of a force whose law, or equilibrium, has no solution, from what is `known` of it
     told: Callable[[Mapping[str, float]], str] | None = None
+    # of the record, in which {name} stands for that of the force, each with its output; the geometry's own if None
     labels: Mapping[str, str] | None = None
+    # energy (J) of a force from its record, where it is no output of the law
     stored: Callable[[DeclaredForce, Sequence[float]], float] | None = None
+    # raises a ModelError if the parameters have no meaning together
     check: Callable[[ElementBuilder, Any], None] | None = None
-    shares: bool = False
+    shares: bool = False  # whether a force may have numbers of others of its class
+    # whether the states of a force that is off (appliesForce) change as those of others do; else they rest
     goes_on: bool = False
     terms: tuple[Parameter, ...] = field(init=False)
 

@@ -131,16 +131,11 @@ class Numbers(Parameter):
 
 @dataclass(frozen=True)
 class Fields(Parameter):
-    """Numbers that the law is given as one named tuple.
+    """Numbers that the law is given as one named tuple."""
 
-    Attributes:
-        type: the tuple; its first fields are the properties.
-        properties: that are numbers.
-        others: the rest of its fields, from a component whose properties will do.
-    """
-
-    type: type[Any]
-    properties: tuple[Number, ...]
+    type: type[Any]  # the tuple; its first fields are the properties
+    properties: tuple[Number, ...]  # that are numbers
+    # the rest of its fields, from a component whose properties will do
     others: Callable[[ElementBuilder, Any], Sequence[float]] = lambda builder, force: ()
 
     @property

@@ -58,26 +58,19 @@ class Reading(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ProbeKind:
-    """A kind of probe.
+    """A kind of probe."""
 
-    Attributes:
-        component: class of the probes.
-        read: what one reads; raises an UnsupportedError for one that cannot be computed.
-        law: gives the quantity of one subject.
-        reads: names of what it is given of a subject: of its record, or "actuation", "speed" and "control".
-        numbers: the tuple that it is given last.
-        measure: computes the results in the place of a law, from the probe, the system after its forces were evaluated,
-            and for what time (s) and state that was.
-        has_curve: whether the law is given a curve.
-    """
-
-    component: type
+    component: type  # class of the probes
+    # what one reads; raises an UnsupportedError for one that cannot be computed
     read: Callable[[ElementBuilder, Any], Reading]
-    law: Callable[..., float] | None = None
+    law: Callable[..., float] | None = None  # gives the quantity of one subject
+    # names of what it is given of a subject: of its record, or "actuation", "speed" and "control"
     reads: tuple[str, ...] = ()
-    numbers: Any = tuple
+    numbers: Any = tuple  # the tuple that it is given last
+    # computes the results in the place of a law, from the probe, the system after its forces were evaluated, and for
+    # what time (s) and state that was
     measure: Callable[[DeclaredProbe, Any, float, Sequence[float]], Sequence[float]] | None = None
-    has_curve: bool = False
+    has_curve: bool = False  # whether the law is given a curve
 
     @property
     def name(self) -> str:

@@ -17,17 +17,13 @@ if TYPE_CHECKING:
 
 
 class Chain(NamedTuple):
-    """A robot whose mass matrix and bias another program computes.
+    """A robot whose mass matrix and bias another program computes."""
 
-    Attributes:
-        joints: that move, in the order of that program.
-        excess: body, and what its principal moments of inertia are larger by there than in the model (kg·m²).
-        supply: kernel in Python. In the work vector it finds values, rates and accelerations of the joints, and writes
-            the forces behind them that these accelerations take against gravity, and the mass matrix.
-    """
-
-    joints: Sequence[RobotJoint]
+    joints: Sequence[RobotJoint]  # that move, in the order of that program
+    # body, and what its principal moments of inertia are larger by there than in the model (kg·m²)
     excess: Sequence[tuple[int, float]]
+    # kernel in Python. In the work vector it finds values, rates and accelerations of the joints, and writes the
+    # forces behind them that these accelerations take against gravity, and the mass matrix.
     supply: Callable[..., None]
 
 

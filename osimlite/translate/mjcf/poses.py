@@ -66,16 +66,11 @@ class Poses:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What a path does in P poses.
+    """What a path does in P poses."""
 
-    Attributes:
-        lengths: (P,), m.
-        arms: moment arms (P, m) about the coordinates that move by themselves, m or 1.
-        nodes: numbers and places (3,) in ground of what the path runs through, see :meth:`Paths.points`.
-    """
-
-    lengths: Array
-    arms: Array
+    lengths: Array  # (P,), m
+    arms: Array  # moment arms (P, m) about the coordinates that move by themselves, m or 1
+    # numbers and places (3,) in ground of what the path runs through, see `points`
     nodes: Sequence[Sequence[tuple[int, Array]]]
 
 

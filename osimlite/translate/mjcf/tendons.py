@@ -19,23 +19,16 @@ from osimlite.translate.mjcf.wrapping import bend, norm, unit
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """A site.
+    """A site."""
 
-    Attributes:
-        body: that it is in.
-        place: in the body (3,), m.
-        coordinate: place in the mechanism of that which moves it, or -1.
-        drive: if it moves: polynomial (5,) of the coordinate, constant first, which gives the value of a helper.
-        slides: if it moves: polynomials (3, 5) of the helper that are added to the place, constant first, m.
-        name: of the path point; empty for one that OpenSim does not know.
-    """
-
-    body: int
-    place: Array
-    coordinate: int = -1
+    body: int  # that it is in
+    place: Array  # in the body (3,), m
+    coordinate: int = -1  # place in the mechanism of that which moves it, or -1
+    # if it moves: polynomial (5,) of the coordinate, constant first, which gives the value of a helper
     drive: Array | None = None
+    # if it moves: polynomials (3, 5) of the helper that are added to the place, constant first, m
     slides: Array | None = None
-    name: str = ""
+    name: str = ""  # of the path point; empty for one that OpenSim does not know
 
 
 @dataclass(frozen=True, eq=False)

@@ -77,11 +77,9 @@ class BetweenFrames(Geometry):
     """Two frames: six deviations of the second from the first, angles (rad) before distances (m), and their rates.
 
     The law fills `loads`: moments (N.m) of the angles and forces (N) of the distances on the second frame.
-
-    Attributes:
-        about_bodies: whether the torques of the record are about the origins of the bodies instead of the frames.
     """
 
+    # whether the torques of the record are about the origins of the bodies instead of the frames
     about_bodies: bool = False
 
     inputs = ("deviations", "rates", "loads")

@@ -21,20 +21,14 @@ from osimlite.simulation.kernels.programs import program
 
 @dataclass(frozen=True)
 class OfCoordinates:
-    """A path that only pulls at coordinates.
+    """A path that only pulls at coordinates."""
 
-    Attributes:
-        path: of its owner.
-        coordinates: places in the mechanism of those that it depends on.
-        length: of the path, as a function of them.
-        arms: moment arms, as functions of them; the derivatives of the length times -1 if there are none.
-        speed: as a function of their values and then their speeds; the rate that follows from the arms if None.
-    """
-
-    path: str
-    coordinates: tuple[int, ...]
-    length: Function | Formula
+    path: str  # of its owner
+    coordinates: tuple[int, ...]  # places in the mechanism of those that it depends on
+    length: Function | Formula  # of the path, as a function of them
+    # moment arms, as functions of them; the derivatives of the length times -1 if there are none
     arms: tuple[Function | Formula, ...] = ()
+    # as a function of their values and then their speeds; the rate that follows from the arms if None
     speed: Function | Formula | None = None
 
     coupled: ClassVar[bool] = False
