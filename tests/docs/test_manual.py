@@ -57,11 +57,13 @@ def blocks(text: str) -> list[Block]:
 
 
 @pytest.fixture
-def shell(tmp_path: Path) -> dict[str, str]:
+def shell(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """An environment in which `osimlite` and `python` are those under test."""
+    # Where it is not known, Matplotlib lists the fonts of the machine anew in each folder, which takes seconds.
+    fonts = os.environ.get("MPLCONFIGDIR") or str(tmp_path_factory.getbasetemp() / "matplotlib")
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", "")))
     home = {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(tmp_path / "cache"))}
-    return {**os.environ, "PATH": path, "MPLBACKEND": "Agg", "COLUMNS": "100", **home}
+    return {**os.environ, "PATH": path, "MPLBACKEND": "Agg", "MPLCONFIGDIR": fonts, "COLUMNS": "100", **home}
 
 
 @pytest.mark.skipif(os.name == "nt", reason="blocks of commands are for bash")
