@@ -89,7 +89,7 @@ def cluster(tmp_path_factory):
 
 
 VARY = ["--vary", "RHip_rz=0.3:0.7", "--vary", "/bodyset/Pelvis/mass=1:2:log"]
-SETTINGS = ["--samples", "900", "--seed", "3", "--to", "1.5", "--accuracy", "1e-3"]
+SETTINGS = ["--samples", "420", "--seed", "3", "--to", "1.5", "--accuracy", "1e-3"]
 MEASURES = ["--measure", "distance", "--measure", "patience:ended"]
 
 
@@ -120,7 +120,7 @@ def test_workers_and_coordinator_are_killed_and_nothing_is_lost(cluster, tmp_pat
     vary = {"RHip_rz": "0.3:0.7", "/bodyset/Pelvis/mass": "1:2:log"}
     measures = ("distance", "patience:ended")
     here = plan(osimlite.read(tmp_path / "walker.osim"), vary, measures=measures, to=1.5)
-    alone = sweep(here, samples(here.variables, None, 900, 3), tmp_path / "alone.parquet")
+    alone = sweep(here, samples(here.variables, None, 420, 3), tmp_path / "alone.parquet")
     partial = tmp_path / "results.parquet.partial"
 
     def grows(process):
@@ -148,7 +148,7 @@ def test_workers_and_coordinator_are_killed_and_nothing_is_lost(cluster, tmp_pat
     assert "there before" in said[0]
 
     table = pq.read_table(tmp_path / "results.parquet").to_pydict()
-    assert table["run"] == list(range(900))
+    assert table["run"] == list(range(420))
     assert set(table["status"]) == {"done"}
 
     assert alone.path.read_bytes() == (tmp_path / "results.parquet").read_bytes()
