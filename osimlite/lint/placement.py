@@ -16,6 +16,7 @@ from bisect import bisect_right
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple, cast
 
+from osimlite.forces.vectors import Vector, along, dot, norm, over, plus
 from osimlite.lint.axes import axes_of, coordinates_of, names_on
 from osimlite.lint.skeleton import skeleton
 from osimlite.lint.subject import Subject, once
@@ -47,7 +48,6 @@ from osimlite.schema.tree import is_a
 if TYPE_CHECKING:
     from osimlite.schema.custom_joint import CustomJoint, TransformAxis
 
-Vector = tuple[float, float, float]
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -63,8 +63,7 @@ class Pose(NamedTuple):
 
     def of(self, point: Vector) -> Vector:
         """A point of the inner frame, in the outer one."""
-        x, y, z = self.turned(point)
-        return x + self.position[0], y + self.position[1], z + self.position[2]
+        return plus(self.turned(point), self.position)
 
     def then(self, inner: Pose) -> Pose:
         """A frame within this one, seen from outside."""
@@ -87,15 +86,9 @@ End = tuple[Component, Pose] | None
 """The body or ground that a frame is fixed to, and where it is on it."""
 
 
-def dot(one: Vector, other: Vector) -> float:
-    """The scalar product."""
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
-
-
 def about(axis: Vector, angle: float) -> Pose:
     """A rotation about an axis, by Rodrigues' formula."""
-    length = math.sqrt(dot(axis, axis)) or 1.0
-    x, y, z = (part / length for part in axis)
+    x, y, z = over(axis, norm(axis) or 1.0)
     c, s = (math.cos(angle), math.sin(angle)) if math.isfinite(angle) else (math.nan, math.nan)
     v = 1 - c
     return Pose(
@@ -207,10 +200,10 @@ def turning_axes(joint: Joint) -> list[tuple[str, Vector]]:
     result: dict[str, Vector] = {}
     turned = Pose()
     for name, axis, angle in turns:
-        length = math.sqrt(dot(axis, axis))
+        length = norm(axis)
         if angle is None or name not in values or length == 0.0:
             return []
-        result[name] = turned.turned((axis[0] / length, axis[1] / length, axis[2] / length))
+        result[name] = turned.turned(over(axis, length))
         turned = turned.then(about(axis, angle))
     return list(result.items())
 
@@ -224,11 +217,10 @@ def _custom(joint: CustomJoint, values: dict[str, float], *, rough: bool) -> Pos
     turned = Pose()
     for axis, amount in zip(axes[:3], known[:3], strict=True):
         turned = turned.then(about(axis.axis, amount))
-    place = [0.0, 0.0, 0.0]
+    place = 0.0, 0.0, 0.0
     for axis, amount in zip(axes[3:], known[3:], strict=True):
-        length = math.sqrt(dot(axis.axis, axis.axis)) or 1.0
-        place = [before + amount * part / length for before, part in zip(place, axis.axis, strict=True)]
-    return Pose(turned.rotation, (place[0], place[1], place[2]))
+        place = along(place, amount / (norm(axis.axis) or 1.0), axis.axis)
+    return Pose(turned.rotation, place)
 
 
 def _along(axis: TransformAxis, values: dict[str, float], rough: bool) -> float | None:

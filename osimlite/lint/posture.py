@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from osimlite.lint.placement import Pose, Vector, on_base, poses_at
+from osimlite.forces.vectors import Vector
+from osimlite.lint.placement import Pose, on_base, poses_at
 from osimlite.lint.setup import Setup
 from osimlite.lint.subject import Subject, once
 from osimlite.lint.table import Table

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from osimlite.document.upgrade.draft import Draft, Element, Refused, is_true, members, reals, step, text_of
+from osimlite.forces.vectors import Vector, cross, norm, vector
 
-_UNIT = (("1", "0", "0"), ("0", "1", "0"), ("0", "0", "1"))
+_UNIT = ("1 0 0", "0 1 0", "0 0 1")
 
 
 @step(below=10901)
@@ -48,13 +49,12 @@ def _carry(draft: Draft, axis: Element, spatial: Element, name: str) -> None:
 
 def _directions(given: list[str | None]) -> list[str]:
     """The texts of three independent directions, of which the first are given."""
-    known = [reals(text, 3) or [float(word) for word in _UNIT[index]] for index, text in enumerate(given)]
-    texts = [text or " ".join(_UNIT[index]) for index, text in enumerate(given)]
+    known = [vector(reals(text, 3) or reals(unit, 3), 0) for text, unit in zip(given, _UNIT, strict=False)]
+    texts = [text or unit for text, unit in zip(given, _UNIT, strict=False)]
     if not known:
-        return [" ".join(unit) for unit in _UNIT]
+        return [*_UNIT]
     if len(known) == 1:
-        units = [[float(word) for word in unit] for unit in _UNIT]
-        second = units[1] if abs(abs(_dot(known[0], units[1])) - 1) >= 1e-4 else units[2]
+        second = (0.0, 1.0, 0.0) if abs(abs(known[0][1]) - 1) >= 1e-4 else (0.0, 0.0, 1.0)
         known.append(second)
         texts.append(" ".join(f"{value:g}" for value in second))
         texts.append(_normal(second, known[0]))
@@ -63,17 +63,7 @@ def _directions(given: list[str | None]) -> list[str]:
     return texts
 
 
-def _dot(left: list[float], right: list[float]) -> float:
-    return left[0] * right[0] + left[1] * right[1] + left[2] * right[2]
-
-
-def _normal(left: list[float], right: list[float]) -> str:
-    cross = [
-        left[1] * right[2] - left[2] * right[1],
-        left[2] * right[0] - left[0] * right[2],
-        left[0] * right[1] - left[1] * right[0],
-    ]
-    length = _dot(cross, cross) ** 0.5
-    if not length:
-        return "0 0 1"
-    return " ".join(repr(value / length + 0.0) for value in cross)
+def _normal(left: Vector, right: Vector) -> str:
+    normal = cross(left, right)
+    length = norm(normal)
+    return " ".join(repr(value / length + 0.0) for value in normal) if length else "0 0 1"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, cast
 
+from osimlite.forces.vectors import Vector, cross, norm
 from osimlite.lint.axes import axes_of, axes_refused, coordinates_of, names_on
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
@@ -174,12 +175,9 @@ def idle_coordinate(subject: Subject, found: FindingSink) -> None:
 _COLLINEAR = 1e-5
 """Length of the cross product of two axes below which OpenSim 4.6 refuses them; it does not make them unit vectors."""
 
-Vector = tuple[float, ...]
-
 
 def _parallel(one: Vector, other: Vector) -> bool:
-    (a, b, c), (d, e, f) = one, other
-    return not math.hypot(b * f - c * e, c * d - a * f, a * e - b * d) >= _COLLINEAR
+    return not norm(cross(one, other)) >= _COLLINEAR
 
 
 def _motion_by(joint: CustomJoint, coordinate: Coordinate) -> list[float]:

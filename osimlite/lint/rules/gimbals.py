@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from osimlite.forces.vectors import dot
 from osimlite.lint.axes import coordinates_of
 from osimlite.lint.engine import WARNING, FindingSink, rule
-from osimlite.lint.placement import dot, turning_axes
+from osimlite.lint.placement import turning_axes
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.joints import Joint

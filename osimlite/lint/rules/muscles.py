@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+from osimlite.forces.vectors import Vector
 from osimlite.lint.config import Threshold
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
-from osimlite.lint.placement import Vector, default_poses, on_base
+from osimlite.lint.placement import default_poses, on_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.coordinates import Coordinate

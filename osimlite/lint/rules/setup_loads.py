@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from osimlite.forces.vectors import Vector, dot
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
-from osimlite.lint.placement import Pose, Vector, dot
+from osimlite.lint.placement import Pose
 from osimlite.lint.posture import poses_in
 from osimlite.lint.setup import Setup, members, motion_of
 from osimlite.lint.table import Table

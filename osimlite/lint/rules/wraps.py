@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
+from osimlite.forces.vectors import Vector
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
-from osimlite.lint.placement import Pose, Vector, fixed, on_base
+from osimlite.lint.placement import Pose, fixed, on_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Component
