@@ -23,15 +23,10 @@ from osimlite.tools.motion import Motion
 
 @dataclass(frozen=True, eq=False)
 class ConstraintForces:
-    """The forces of the constraints of a mechanism at one state.
+    """The forces of the constraints of a mechanism at one state."""
 
-    Attributes:
-        state: at which they are, with the accelerations that they lead to.
-        multipliers: of the constraints, one number (m,) for each of the equations of each.
-    """
-
-    state: Kinematics
-    multipliers: list[tuple[Constraint, Array]]
+    state: Kinematics  # at which they are, with the accelerations that they lead to
+    multipliers: list[tuple[Constraint, Array]]  # of the constraints, one number (m,) for each of the equations of each
 
     @classmethod
     def along(cls, motion: Motion) -> Iterator[ConstraintForces]:

@@ -26,34 +26,20 @@ BRIEF = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """The motion of a run, and what was measured.
+    """The motion of a run, and what was measured."""
 
-    Attributes:
-        model: what moves.
-        file: of the model.
-        times: (t,), s.
-        coordinates: names of the n coordinates.
-        values: (t, n), rad and m.
-        turning: which of them are angles.
-        markers: names of the m markers that were fitted.
-        measured: where they were (t, m, 3), m; NaN where one was not seen.
-        places: where they are in the model (t, m, 3), m.
-        loads: the file of measured loads.
-        sensors: names of the k sensors that were fitted.
-        angles: how far they are turned from where they were measured (t, k), rad; NaN where one was not.
-    """
-
-    model: Model
-    file: Path
-    times: Array
-    coordinates: Sequence[str]
-    values: Array
-    turning: Sequence[bool]
-    markers: Sequence[str] = ()
-    measured: Array | None = None
-    places: Array | None = None
-    loads: Path | None = None
-    sensors: Sequence[str] = ()
+    model: Model  # what moves
+    file: Path  # of the model
+    times: Array  # (t,), s
+    coordinates: Sequence[str]  # names of the n coordinates
+    values: Array  # (t, n), rad and m
+    turning: Sequence[bool]  # which of them are angles
+    markers: Sequence[str] = ()  # names of the m markers that were fitted
+    measured: Array | None = None  # where they were (t, m, 3), m; NaN where one was not seen
+    places: Array | None = None  # where they are in the model (t, m, 3), m
+    loads: Path | None = None  # the file of measured loads
+    sensors: Sequence[str] = ()  # names of the k sensors that were fitted
+    # how far they are turned from where they were measured (t, k), rad; NaN where one was not
     angles: Array | None = None
 
     @classmethod

@@ -19,17 +19,11 @@ NONE = frozenset(("", "Unassigned"))
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """A setup that is run.
+    """A setup that is run."""
 
-    Attributes:
-        setup: what the document says.
-        file: the document.
-        output: folder for all results, in place of those that the setup names.
-    """
-
-    setup: Any
-    file: Path
-    output: Path | None = None
+    setup: Any  # what the document says
+    file: Path  # the document
+    output: Path | None = None  # folder for all results, in place of those that the setup names
 
     def error(self, message: str) -> DocumentError:
         """An error of the setup."""

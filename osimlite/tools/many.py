@@ -35,31 +35,18 @@ SAVE_SECONDS = 1.0
 
 @dataclass
 class Trial:
-    """What became of a setup.
+    """What became of a setup."""
 
-    Attributes:
-        setup: the file.
-        status: see `DONE` and the others.
-        told: names, and what is said of each.
-        summary: numbers that say how it went.
-        files: that were written.
-        message: why it failed.
-        warnings: what the check found beside errors; what has a suggestion first.
-        seconds: that it took.
-        digest: of the setup and all files that it names, as they were.
-        was_done: whether that was before this run.
-    """
-
-    setup: str
-    status: str
-    told: list[tuple[str, str]] = field(default_factory=list)
-    summary: dict[str, Any] = field(default_factory=dict)
-    files: list[str] = field(default_factory=list)
-    message: str = ""
-    warnings: list[str] = field(default_factory=list)
-    seconds: float = 0.0
-    digest: str = ""
-    was_done: bool = False
+    setup: str  # the file
+    status: str  # see `DONE` and the others
+    told: list[tuple[str, str]] = field(default_factory=list)  # names, and what is said of each
+    summary: dict[str, Any] = field(default_factory=dict)  # numbers that say how it went
+    files: list[str] = field(default_factory=list)  # that were written
+    message: str = ""  # why it failed
+    warnings: list[str] = field(default_factory=list)  # what the check found beside errors; what has a suggestion first
+    seconds: float = 0.0  # that it took
+    digest: str = ""  # of the setup and all files that it names, as they were
+    was_done: bool = False  # whether that was before this run
 
 
 class Interrupted(OsimliteError):

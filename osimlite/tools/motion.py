@@ -35,23 +35,14 @@ LEAST_TIMES = 6
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """States of a model over time.
+    """States of a model over time."""
 
-    Attributes:
-        model: what moves.
-        simulation: that computes its forces and accelerations.
-        times: (t,), s.
-        states: (t, y), in the order of the simulation's engine.
-        steps: the start and the ends of all steps, if the motion was integrated.
-        record: gives what was measured, of which the motion is a part.
-    """
-
-    model: Model
-    simulation: Simulation
-    times: Array
-    states: Array
-    steps: Sequence[Moment] = ()
-    record: Callable[[], Record] | None = None
+    model: Model  # what moves
+    simulation: Simulation  # that computes its forces and accelerations
+    times: Array  # (t,), s
+    states: Array  # (t, y), in the order of the simulation's engine
+    steps: Sequence[Moment] = ()  # the start and the ends of all steps, if the motion was integrated
+    record: Callable[[], Record] | None = None  # gives what was measured, of which the motion is a part
 
     @cached_property
     def _found(self) -> dict[str, Any]:
@@ -169,19 +160,12 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """Where the tables of an analysis go.
+    """Where the tables of an analysis go."""
 
-    Attributes:
-        job: the setup.
-        outcome: that has them written.
-        name: of the analysis.
-        times: of all rows (t,), s.
-    """
-
-    job: Job
-    outcome: Outcome
-    name: str
-    times: Array
+    job: Job  # the setup
+    outcome: Outcome  # that has them written
+    name: str  # of the analysis
+    times: Array  # of all rows (t,), s
 
     def add(
         self,

@@ -30,25 +30,16 @@ def _endless(what: str, time: float) -> SimulationError:
 
 @dataclass(eq=False)
 class Outcome:
-    """What came out of a setup.
+    """What came out of a setup."""
 
-    Attributes:
-        tables: by the names of their files.
-        summary: numbers that say how it went.
-        told: the same in words: a name, and what is said of it.
-        files: those that were written.
-        warnings: what the check of the setup and of what it names found beside errors; what has a suggestion first.
-        evidence: what a report shows besides.
-        done: whether the tool did what it was asked for; what it found is written all the same.
-    """
-
-    tables: dict[str, StoTable] = field(default_factory=dict)
-    summary: dict[str, Any] = field(default_factory=dict)
-    told: list[tuple[str, str]] = field(default_factory=list)
-    files: list[Path] = field(default_factory=list)
+    tables: dict[str, StoTable] = field(default_factory=dict)  # by the names of their files
+    summary: dict[str, Any] = field(default_factory=dict)  # numbers that say how it went
+    told: list[tuple[str, str]] = field(default_factory=list)  # the same in words: a name, and what is said of it
+    files: list[Path] = field(default_factory=list)  # those that were written
+    # what the check of the setup and of what it names found beside errors; what has a suggestion first
     warnings: list[Finding] = field(default_factory=list)
-    evidence: Evidence | None = None
-    done: bool = True
+    evidence: Evidence | None = None  # what a report shows besides
+    done: bool = True  # whether the tool did what it was asked for; what it found is written all the same
     _texts: dict[Path, Iterable[str]] = field(default_factory=dict)
 
     def table(self, path: Path, table: StoTable, description: str = "", precision: int = PRECISION) -> None:

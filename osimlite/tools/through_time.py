@@ -128,17 +128,11 @@ def simulation_of(job: Job, model: Model) -> Simulation:
 
 
 class StateRows(NamedTuple):
-    """States of a file.
+    """States of a file."""
 
-    Attributes:
-        table: the file.
-        columns: places of the columns by the paths of the states.
-        missing: paths of the states that have no column.
-    """
-
-    table: StoTable
-    columns: dict[str, int]
-    missing: tuple[str, ...]
+    table: StoTable  # the file
+    columns: dict[str, int]  # places of the columns by the paths of the states
+    missing: tuple[str, ...]  # paths of the states that have no column
 
     @classmethod
     def read(cls, job: Job, path: Path, simulation: Simulation) -> StateRows:

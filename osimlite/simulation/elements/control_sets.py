@@ -19,11 +19,15 @@ from osimlite.simulation.elements.control_tables import read_controls
 
 @dataclass(frozen=True)
 class ControlCurves:
-    """The controls of a file."""
+    """The controls of a file.
 
-    # functions of time by the names of the controls; of several controls of a name the first
+    Attributes:
+        curves: functions of time by the names of the controls; of several controls of a name the first.
+        of_model: the names of those that the model is to have.
+    """
+
     curves: Mapping[str, Function]
-    of_model: Sequence[str]  # the names of those that the model is to have
+    of_model: Sequence[str]
 
     @classmethod
     def read(cls, path: Path) -> ControlCurves:

@@ -34,17 +34,11 @@ SLACK = 0.1
 
 
 class Actuators(NamedTuple):
-    """What the actuators of a tool are.
+    """What the actuators of a tool are."""
 
-    Attributes:
-        residuals: units of those that push the body at the root, by their names.
-        reserves: coordinates of those that push others, by their names.
-        muscles: names.
-    """
-
-    residuals: Mapping[str, str]
-    reserves: Mapping[str, str]
-    muscles: Sequence[str]
+    residuals: Mapping[str, str]  # units of those that push the body at the root, by their names
+    reserves: Mapping[str, str]  # coordinates of those that push others, by their names
+    muscles: Sequence[str]  # names
 
 
 def actuators_of(tool: Tool | None) -> Actuators:

@@ -32,17 +32,11 @@ GAP = 0.05
 
 
 class Load(NamedTuple):
-    """A force that was measured.
+    """A force that was measured."""
 
-    Attributes:
-        item: of the document.
-        force: in its frame (t, 3), N.
-        point: in its frame (t, 3), m; None if there is none.
-    """
-
-    item: ExternalForce
-    force: Array
-    point: Array | None
+    item: ExternalForce  # of the document
+    force: Array  # in its frame (t, 3), N
+    point: Array | None  # in its frame (t, 3), m; None if there is none
 
 
 class Scale(NamedTuple):
