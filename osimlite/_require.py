@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from types import ModuleType
 
 from osimlite.errors import MissingDependency
+
+
+@cache
+def absent(*packages: str) -> tuple[str, ...]:
+    """Those of some packages that are not installed."""
+    return tuple(name for name in packages if find_spec(name) is None)
 
 
 def require(module: str, *, extra: str, purpose: str, instead: str = "") -> ModuleType:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import stat
 import sys
 from collections.abc import Iterator
@@ -292,6 +291,8 @@ def _copy_into(name: str | Path, target: Path) -> None:
     Raises:
         OsimliteError: it cannot be written whole; the first file is kept then.
     """
+    import shutil
+
     try:
         with open(name, "rb") as source, target.open("r+b") as stream:
             shutil.copyfileobj(source, stream)

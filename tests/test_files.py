@@ -266,7 +266,7 @@ def test_what_cannot_be_given_to_a_new_file_stays_on_the_old(tmp_path: Path, mon
     monkeypatch.setattr(os, "chmod", refuse)
     files.write_atomically(place, "after")
     assert place.read_text() == "after" and place.stat().st_ino == number
-    monkeypatch.setattr("osimlite.files.shutil.copyfileobj", refuse)
+    monkeypatch.setattr("shutil.copyfileobj", refuse)
     with pytest.raises(OsimliteError, match=r"not permitted; what was to be written is in (.*)") as caught:
         files.write_atomically(place, "later")
     assert Path(str(caught.value).rpartition(" ")[2]).read_text() == "later"

@@ -10,9 +10,10 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from types import UnionType
-from typing import Any, NamedTuple, get_args, get_origin
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args, get_origin
 
-from osimlite.choices import Choice
+if TYPE_CHECKING:
+    from osimlite.choices import Choice
 
 _NUMBERS = {int: re.compile(r"[0-9]+", re.ASCII), float: re.compile(r"[0-9]*\.?[0-9]+(e[-+]?[0-9]+)?", re.ASCII)}
 """Texts of numbers that mean the same to everybody."""

@@ -11,7 +11,6 @@ from osimlite.cli._console import complain, hand_over, print_diff, say, show, wa
 from osimlite.cli._progress import progress_bar
 from osimlite.errors import MissingFileError, OsimliteError
 from osimlite.files import read_standard_input, unsaved
-from osimlite.lint import measures
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
 from osimlite.lint.many import check_files, settings_of
@@ -72,10 +71,9 @@ def run(
     if fix or unsafe_fixes:
         count, left, failed = _mend_all(files, given, unsafe=unsafe_fixes)
         say(f"Mended {counted(count, 'place')}{_more(left)}.", err=True)
-    # Somebody who looks on is told what is not measured yet.
-    measures.waits = not sys.stderr.isatty()
     with progress_bar("checking", len(files)) as progress:
-        report = check_files(files, given, cached=cached, progress=progress)
+        # Somebody who looks on is told what is not measured yet.
+        report = check_files(files, given, cached=cached, waits=not sys.stderr.isatty(), progress=progress)
     report.passed = passed
     if write_baseline is not None:
         from osimlite.lint.baseline import write_baseline as write
@@ -207,9 +205,11 @@ def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int, bool]:
 
 def terminal_width() -> int:
     """Columns of the terminal; 80 if there is none."""
+    if not sys.stdout.isatty():
+        return 80
     import shutil
 
-    return shutil.get_terminal_size((80, 24)).columns if sys.stdout.isatty() else 80
+    return shutil.get_terminal_size((80, 24)).columns
 
 
 def _statistics(report: Report, everything: bool) -> str:

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
 from osimlite import __version__
+from osimlite._require import absent
 from osimlite.errors import OsimliteError
 from osimlite.files import read_file, stamped, write_atomically
-from osimlite.lint import measures
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Report, Severity
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def key_of(file: str, config: Config) -> str:
     thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
     setting = (
         _code(), file, os.getcwd(), config.select, config.ignore, severity, config.mesh_paths, thresholds,
-        [(path, stamped(path)) for path in config.classes], config.target_version, measures.absent(),
+        [(path, stamped(path)) for path in config.classes], config.target_version, absent("numpy", "numba"),
     )  # fmt: skip
     return ascii(setting)
 
@@ -160,8 +160,13 @@ def _stamp_since(file: str, moment: int) -> list[int] | None:
 
 @cache
 def _code() -> str:
-    """Which code this is. In a working copy the version stays the same while rules change: the files then tell."""
+    """Which code this is. In a working copy the version stays the same while rules change: the files then tell.
+
+    What is installed changes as a whole.
+    """
     package = Path(__file__).parents[1]
+    if not (package.parent / "pyproject.toml").exists():
+        return f"{__version__} {os.stat(__file__).st_mtime_ns}"
     times = []
     for folder, folders, names in os.walk(package):
         folders[:] = [name for name in folders if name != "__pycache__"]

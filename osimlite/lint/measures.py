@@ -7,12 +7,11 @@ above linter and simulation: it is loaded by its name, for a model that has some
 from __future__ import annotations
 
 from collections.abc import Container
-from functools import cache
 from importlib import import_module
-from importlib.util import find_spec
 from math import degrees
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
+from osimlite._require import absent
 from osimlite.errors import OsimliteError
 from osimlite.text import listed
 
@@ -168,7 +167,7 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
     from osimlite.schema.tree import lent
 
     compiles = sum(1 for _ in subject.named("PathWrap")) > FEW
-    missing = [name for name in ("numpy", "numba") if name in absent() and (compiles or name == "numpy")]
+    missing = absent("numpy", "numba") if compiles else absent("numpy")
     if missing:
         return f"that needs {listed(missing)}; run: pip install 'osimlite[sim]'"
     parts = parts_of(subject)
@@ -205,9 +204,3 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
 def measures_of(subject: Subject) -> Measures:
     """What was measured of a model."""
     return cast("Measures", subject.kept[MEASURES])
-
-
-@cache
-def absent() -> tuple[str, ...]:
-    """What is not installed of the libraries that this takes."""
-    return tuple(name for name in ("numpy", "numba") if find_spec(name) is None)

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from osimlite._require import absent
 from osimlite.document.source import Source
-from osimlite.lint import Config, measures, parts, validate
+from osimlite.lint import Config, cache, measures, parts, validate
 from osimlite.lint.many import check_files
 from osimlite.lint.reporters import render
 from osimlite.multibody.parts import CoordinateInfo
@@ -27,7 +28,7 @@ def jumping(fixtures: Path, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def without_numpy(monkeypatch):
-    monkeypatch.setattr(measures, "absent", lambda: ("numpy",))
+    monkeypatch.setattr(measures, "absent", lambda *names: ("numpy",))
 
 
 def test_a_model_without_muscles_is_checked_without_a_numeric_library(fixtures):
@@ -51,7 +52,8 @@ def test_what_is_missing_is_told_in_one_line_and_is_no_finding(jumping, without_
 
 def test_the_cache_tells_it_again_and_measures_once_it_can(jumping, monkeypatch):
     with monkeypatch.context() as context:
-        context.setattr(measures, "absent", lambda: ("numpy",))
+        for module in (measures, cache):
+            context.setattr(module, "absent", lambda *names: ("numpy",))
         reports = [check_files([str(jumping)], Config()) for _ in range(2)]
     assert all(len(report.unmeasured) == 1 and not report.findings for report in reports)
     assert check_files([str(jumping)], Config()).codes == {"OSIM632": 2}
@@ -121,9 +123,9 @@ def begun(monkeypatch):
     return names
 
 
-@pytest.mark.skipif("numba" in measures.absent(), reason="numba is not installed")
+@pytest.mark.skipif(bool(absent("numba")), reason="numba is not installed")
 def test_nobody_who_looks_on_waits_for_a_compiler(jumping, begun, monkeypatch):
-    report = check_files([str(jumping)], Config())
+    report = check_files([str(jumping)], Config(), waits=False)
     (why,) = report.unmeasured
     assert "machine code" in why and "run it again" in why
     assert not report.findings and {"evaluate", "watch", "straight_path"} <= set(begun)

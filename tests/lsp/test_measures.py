@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from osimlite.lint import measures
+from osimlite._require import absent
 
-pytestmark = pytest.mark.skipif("numpy" in measures.absent(), reason="numpy is not installed")
+pytestmark = pytest.mark.skipif(bool(absent("numpy")), reason="numpy is not installed")
 
 
 def of_paths(diagnostics):
