@@ -29,6 +29,7 @@ class Surface:
     points: Array  # (n, 3)
     triangles: Indices  # (t, 3) places of points, counter-clockwise seen from outside
     normals: Array | None = None  # outward unit vectors at the points (n, 3), or None
+    is_closed: bool = False  # whether it is known that nobody sees its inside
 
     def stretched(self, factors: Sequence[float]) -> Surface:
         """The surface with its coordinates multiplied by `factors` (3,), and its outside still outside."""
@@ -40,7 +41,7 @@ class Surface:
             normals = normals * np.array((b * c, c * a, a * b)) * (-1.0 if turned else 1.0)
             lengths = np.linalg.norm(normals, axis=1, keepdims=True)
             normals = normals / np.where(lengths > 0.0, lengths, 1.0)
-        return Surface(self.points * np.array(factors), triangles, normals)
+        return Surface(self.points * np.array(factors), triangles, normals, self.is_closed)
 
     def obj(self) -> str:
         """The text of an OBJ file."""

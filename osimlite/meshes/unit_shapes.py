@@ -58,7 +58,7 @@ def cube() -> Surface:
             normals.append(np.tile(sign * np.eye(3)[axis], (4, 1)))
             corners = np.array(((0, 1, 2), (0, 2, 3))) + first
             triangles.append(corners if sign > 0.0 else corners[:, ::-1])
-    return Surface(np.concatenate(points), np.concatenate(triangles), np.concatenate(normals))
+    return Surface(np.concatenate(points), np.concatenate(triangles), np.concatenate(normals), is_closed=True)
 
 
 @cache
@@ -96,7 +96,7 @@ def _turned(strips: Sequence[Array], slices: int = SLICES) -> Surface:
         triangles.append(np.column_stack((a, b, b + slices))[apart[row]])
         triangles.append(np.column_stack((a, b + slices, a + slices))[apart[row + 1]])
         first += len(strip) * slices
-    return Surface(np.concatenate(points), np.concatenate(triangles), np.concatenate(normals))
+    return Surface(np.concatenate(points), np.concatenate(triangles), np.concatenate(normals), is_closed=True)
 
 
 def normals_of(surface: Surface) -> Array:

@@ -232,14 +232,15 @@ class _Heap:
             light = _AMBIENT + _FROM_KEY * (normals @ _KEY).clip(0.0) + _FROM_FILL * (normals @ _FILL).clip(0.0)
             shades *= light[:, None]
         corners, colors = places[surface.triangles], shades[surface.triangles]
+        # The far side is not drawn where it is hidden, nor of what shines through unless it is all there is of a sheet.
+        is_hidden = surface.is_closed and np.linalg.det(matrix[:3, :3]) > 0.0
+        if is_hidden or (opacity < 1.0 and len(corners) > 2):
+            (ax, ay), (bx, by), (cx, cy) = (corners[:, index, :2].T for index in range(3))
+            seen = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0.0
+            corners, colors = corners[seen], colors[seen]
         if opacity >= 1.0:
             self._solid.append((corners, colors))
         elif opacity > 0.0:
-            # Of what shines through, the far side is not drawn, unless that is all there is of a sheet.
-            if len(corners) > 2:
-                (ax, ay), (bx, by), (cx, cy) = (corners[:, index, :2].T for index in range(3))
-                seen = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0.0
-                corners, colors = corners[seen], colors[seen]
             self._glassy.append((corners, colors, np.full(len(corners), opacity)))
 
     def onto(self, canvas: Canvas) -> None:
