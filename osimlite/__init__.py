@@ -3,8 +3,8 @@
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
 ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``inverse_kinematics``,
 ``FrameSolver``, ``scale``, ``fit``, ``kinematics``, ``inverse_dynamics``, ``static_optimization``, ``casadi``,
-``linearize``, ``run``, ``check_trial``, ``report``, the errors, and every component class under OpenSim's own name
-(``osimlite.PinJoint``).
+``linearize``, ``modify``, ``run``, ``check_trial``, ``report``, the errors, and every component class under OpenSim's
+own name (``osimlite.PinJoint``).
 Names are imported when first used, so that importing osimlite costs nothing.
 """
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from osimlite.fitting.person import fit as fit
     from osimlite.fitting.scale_tool import scale as scale
     from osimlite.lint import validate as validate
+    from osimlite.modifying.words import modify as modify
     from osimlite.multibody import build_mechanism as mechanism
     from osimlite.schema.model import Model as Model
     from osimlite.simulation import simulate as simulate
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
         "kinematics",
         "linearize",
         "mechanism",
+        "modify",
         "muscle_curves",
         "paths",
         "read",
@@ -89,6 +91,7 @@ _FUNCTIONS = {
     "fit": "osimlite.fitting.person",
     "scale": "osimlite.fitting.scale_tool",
     "linearize": "osimlite.backends.linear",
+    "modify": "osimlite.modifying.words",
     "mechanism": "osimlite.multibody:build_mechanism",
     "to_mjcf": "osimlite.translate",
     "to_urdf": "osimlite.translate",

@@ -27,6 +27,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "translate": ("numpy",),
     "simulate": ("numpy",),
     "kinematics": ("numpy",),
+    "modify": ("numpy",),
     "scale": ("numpy",),
     "ik": ("numpy",),
     "inverse-dynamics": ("numpy",),

@@ -1,0 +1,75 @@
+"""``osimlite modify``: parts of a model replaced by smoother, stiffer or simpler ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from osimlite.cli._command import Argument, Option, command
+
+
+@command
+def modify(
+    file: Annotated[
+        Path, Argument(help="A model, or a study whose ModelProcessor is carried out.", show_default=False)
+    ],
+    output: Annotated[
+        Path | None,
+        Option("-o", "--output", metavar="FILE", help="The changed model.", show_default="<name>_modified.osim"),
+    ] = None,
+    replace: Annotated[
+        list[str] | None,
+        Option(
+            "--replace",
+            metavar="NAME=WORD",
+            help="muscles=degroote|path-actuators|none, tendon=rigid|explicit|implicit, activation=none, passive=none, "
+            "paths=polynomial|FILE, contact=smooth, joints=weld:NAME,NAME, reserves=FORCE[:BOUND], strength=FACTOR, "
+            "width=FACTOR, external-loads=FILE. May be repeated; the first is done first.",
+        ),
+    ] = None,
+) -> None:
+    """Replace parts of a model as OpenSim's ModOps do: muscles, tendons, paths, contact, joints.
+
+    With paths=polynomial every path becomes a function of the coordinates, wrapping included, and what it is off is
+    told. Of a MocoStudy, MocoTrack or MocoInverse the model is taken as its ModelProcessor makes it.
+
+    Example: osimlite modify gait.osim --replace muscles=degroote --replace tendon=rigid --replace paths=polynomial
+    """
+    from osimlite.cli._console import add_row, plain_console, plain_table, say
+    from osimlite.document.printer import write
+    from osimlite.document.reader import read, read_any
+    from osimlite.errors import DocumentError, SettingError
+    from osimlite.modifying.processing import processed
+    from osimlite.modifying.words import change_of
+    from osimlite.schema.model import Model
+    from osimlite.schema.tools.processors import ModelProcessor
+    from osimlite.text import counted
+
+    changes = []
+    for word in replace or ():
+        name, equals, value = word.partition("=")
+        if not equals:
+            raise SettingError(f"--replace takes NAME=WORD, such as muscles=degroote; got '{word}'")
+        changes.append(change_of(name, value))
+    top = read_any(file)
+    if isinstance(top, Model):
+        model = read(file)
+    else:
+        processor = next((part for part in top.walk() if isinstance(part, ModelProcessor)), None)
+        if processor is None:
+            raise DocumentError(f"a {type(top).__name__} has no model to change", file=str(file))
+        model = processed(processor, file.parent)
+    fitted = [item for change in changes for item in change(model, file.parent) or ()]
+    target = output or file.with_name(f"{file.stem}_modified.osim")
+    write(model, target)
+    if fitted:
+        table = plain_table()
+        for heading in ("path", "coordinates", "order", "length, mm", "moment arm, mm", "worst, mm"):
+            table.add_column(heading, justify="left" if heading == "path" else "right")
+        for item in sorted(fitted, key=lambda item: -item.worst_arm):
+            numbers = (item.length, item.arm, max(item.worst_length, item.worst_arm))
+            count = len(item.path.coordinate_paths)
+            name = item.path.name.rpartition("/")[2]
+            add_row(table, name, str(count), str(item.order), *(f"{1e3 * number:.3f}" for number in numbers))
+        plain_console().print(table)
+    say(f"{target}: {counted(len(list(model.components())), 'component')}")

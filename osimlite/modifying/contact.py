@@ -1,0 +1,68 @@
+"""Smooth contact in the place of Hunt and Crossley's: a SmoothSphereHalfSpaceForce for each sphere on a half space."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from osimlite.errors import UnsupportedError
+from osimlite.schema.contact import ContactHalfSpace, ContactSphere
+from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
+from osimlite.schema.forces import HuntCrossleyForce
+from osimlite.schema.model import Model
+
+
+def smooth_contacts(model: Model) -> None:
+    """Replace all forces of Hunt and Crossley's between spheres and half spaces by smooth ones of the same stiffness.
+
+    Simbody combines both surfaces: stiffnesses as two springs in a row, dissipations by how much each yields, friction
+    by the harmonic mean. Where both are alike the smooth force has the same numbers.
+
+    Raises:
+        UnsupportedError: other surfaces touch.
+    """
+    geometries = {item.name: item for item in model.contact_geometry_set.objects}
+    for force in [item for item in model.force_set.objects if isinstance(item, HuntCrossleyForce)]:
+        known: dict[str, Any] = {}
+        for parameters in force.contact_parameters.objects:
+            known |= dict.fromkeys((_last(item) for item in parameters.geometry), parameters)
+        spheres = [name for name in known if isinstance(geometries.get(name), ContactSphere)]
+        planes = [name for name in known if isinstance(geometries.get(name), ContactHalfSpace)]
+        if len(spheres) + len(planes) < len(known) or not planes or not spheres:
+            raise UnsupportedError(
+                f"'{force.name}' is not between spheres and half spaces, for which alone there is a smooth force"
+            )
+        made = [
+            _smooth(force, sphere, plane, known, len(spheres) * len(planes) > 1)
+            for plane in planes
+            for sphere in spheres
+        ]
+        place = model.force_set.objects.index(force)
+        model.force_set.objects[place : place + 1] = made
+
+
+def _last(item: Any) -> str:
+    """The name of a geometry, or the last part of its path."""
+    return str(getattr(item, "name", item)).rpartition("/")[2]
+
+
+def _smooth(force: Any, sphere: str, plane: str, known: dict[str, Any], several: bool) -> SmoothSphereHalfSpaceForce:
+    one, other = known[sphere], known[plane]
+    softness = [item.stiffness ** (-2.0 / 3.0) if item.stiffness else float("inf") for item in (one, other)]
+    share = softness[0] / sum(softness)
+
+    def mean(name: str) -> float:
+        a, b = getattr(one, name), getattr(other, name)
+        return 2.0 * a * b / (a + b) if a + b else 0.0
+
+    return SmoothSphereHalfSpaceForce(
+        name=f"{force.name}_{sphere}" if several else force.name,
+        appliesForce=force.appliesForce,
+        socket_sphere=f"/contactgeometryset/{sphere}",
+        socket_half_space=f"/contactgeometryset/{plane}",
+        stiffness=(2.0 / sum(softness)) ** 1.5,
+        dissipation=one.dissipation * share + other.dissipation * (1.0 - share),
+        static_friction=mean("static_friction"),
+        dynamic_friction=mean("dynamic_friction"),
+        viscous_friction=mean("viscous_friction"),
+        transition_velocity=force.transition_velocity,
+    )

@@ -1,0 +1,64 @@
+"""Operators on models here and in OpenSim's ModelProcessor, live: the same models by meaning."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import osimlite
+from osimlite.modifying.processing import processed
+from osimlite.schema.difference import differences
+from osimlite.schema.tools import processors as p
+
+pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+pytestmark = pytest.mark.oracle
+
+SCRIPT = """
+import opensim
+opensim.Logger.setLevelString("Off")
+processor = opensim.OpenSimObject.makeObjectFromFile("processor.xml")
+processor = opensim.ModelProcessor.safeDownCast(processor)
+processor.process().printToXML("theirs.osim")
+"""
+LEGS = ("mtp_r", "subtalar_l")
+CASES: dict[str, list[Any]] = {
+    "muscles": [
+        p.ModOpReplaceMusclesWithDeGrooteFregly2016(),
+        p.ModOpIgnorePassiveFiberForcesDGF(),
+        p.ModOpScaleActiveFiberForceCurveWidthDGF(scale_factor=1.5),
+        p.ModOpTendonComplianceDynamicsModeDGF(mode="implicit"),
+    ],
+    "stiff": [
+        p.ModOpIgnoreTendonCompliance(),
+        p.ModOpIgnoreActivationDynamics(),
+        p.ModOpScaleMaxIsometricForce(scale_factor=2.0),
+    ],
+    "reserves": [p.ModOpAddReserves(optimal_force=50.0, bound=2.0), p.ModOpAddReserves(optimal_force=3.0)],
+    "residuals": [p.ModOpRemoveMuscles(), p.ModOpAddReserves(skip_residual_coordinates=True)],
+    "actuators": [p.ModOpReplaceMusclesWithPathActuators()],
+    "welds": [p.ModOpReplaceJointsWithWelds(joint_paths=LEGS), p.ModOpAddReserves(optimal_force=1.0)],
+}
+
+
+def changed(folder: Path, model: Path, operators: list[Any]) -> list[Any]:
+    """How a model that was changed here differs from OpenSim's."""
+    osimlite.write(osimlite.read(model), folder / "model.osim")
+    processor = p.ModelProcessor(name="processor", filepath="model.osim", operators=operators)
+    osimlite.write(processor, folder / "processor.xml")
+    subprocess.run([sys.executable, "-c", SCRIPT], cwd=folder, check=True, capture_output=True, timeout=100)
+    osimlite.write(processed(processor, folder), folder / "ours.osim")
+    ours, theirs = (osimlite.read(folder / f"{name}.osim") for name in ("ours", "theirs"))
+    return [str(item) for item in differences(ours, theirs)]
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("number", ["m0013", "m0001"])
+def test_the_model_is_that_of_opensim(corpus: Any, tmp_path: Path, case: str, number: str) -> None:
+    if case == "welds" and number == "m0001":
+        pytest.skip("an arm has no feet")
+    path = next(item.path for item in corpus if item.id == number)
+    assert not changed(tmp_path, path, CASES[case])
