@@ -20,6 +20,9 @@ class Bounded(np.ndarray[Any, Any]):
 
 
 def _inside(place: Any) -> Any:
+    if type(place) is int and place >= 0:
+        # Millions of times.
+        return place
     ends = (place.start, place.stop) if isinstance(place, slice) else (place,)
     if any(isinstance(end, int | np.integer) and end < 0 for end in ends):
         raise IndexError(f"the place {place} is before the vector")
