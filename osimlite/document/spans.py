@@ -190,7 +190,10 @@ class PlainSpans(Sequence[Span]):
         start, tag, tag_end = match.start(), match["open"], match.end()
         if match["empty"]:
             return Span(tag, start, tag_end, tag_end, tag_end)
-        close = self._close(tag, tag_end)
+        close = self.text.rfind(f"</{tag}") if number == 0 else -1
+        # Behind the root there is rarely anything, which could be a comment with what looks like its end.
+        if close < 0 or "".join(self.text[close:].split()) != f"</{tag}>":
+            close = self._close(tag, tag_end)
         return Span(tag, start, tag_end, close, self.text.index(">", close) + 1)
 
     def _is_in_sight(self, place: int, start: int) -> bool:

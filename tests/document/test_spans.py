@@ -90,3 +90,10 @@ def test_the_walker_is_read_in_parts(fixtures: Path) -> None:
     assert isinstance(source.spans, PlainSpans)
     assert source.spans[:2] == one_by_one(source.text)[:2]
     assert list(source.spans) == spans_of(source.text)
+
+
+@pytest.mark.parametrize("behind", ["", "\n", "<!-- </a> -->", "<!-- </a>\n-->\n", "<?end </a>?>"])
+@pytest.mark.parametrize("close", ["</a>", "</a >"])
+def test_the_root_ends_where_it_does_whatever_is_behind_it(close: str, behind: str) -> None:
+    text = f"<a><b>1</b><!-- </a> -->{close}{behind}"
+    assert list(PlainSpans(text, 2)) == spans_of(text)
