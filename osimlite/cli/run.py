@@ -104,12 +104,13 @@ def _codes(trials: list[Trial]) -> list[int]:
 
 def _run_alone(setup: Path, output: Path | None) -> Outcome:
     """Run a setup, and say what came out."""
+    from osimlite.cli._console import say
     from osimlite.lint.diagnostic import Report
     from osimlite.tools.running import FaultySetup
     from osimlite.tools.running import run as run_setup
 
     try:
-        outcome = run_setup(setup, output, tell=_show_findings)
+        outcome = run_setup(setup, output, tell=_show_findings, progress=lambda line: say(line, err=True))
     except FaultySetup as fault:
         _show_findings(Report(fault.report.errors, fault.report.texts))
         raise

@@ -52,6 +52,7 @@ def run(
     *,
     check: bool = True,
     tell: Callable[[Report], None] | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> Outcome:
     """Run the setup of a tool as OpenSim would, and write the files that it would write.
 
@@ -61,6 +62,7 @@ def run(
         check: whether the setup and all that it names but the model are checked first.
         tell: is told, before anything is computed, what is misspelt although the tool runs with it, such as a marker
             or a sensor that is left out then, or the units of a table.
+        progress: is told, line by line, how far a long search has come.
 
     Returns:
         The tables that were written, as they were before they were rounded to the digits of the files, and a summary.
@@ -77,7 +79,7 @@ def run(
     tag = type(top).__name__
     if not _is_there(tag):
         raise NotRunnable(f"setups of {tag} cannot be run; those of {listed(runnable())} can", file=str(file))
-    outcome = Outcome()
+    outcome = Outcome(progress=progress)
     if check:
         away: dict[str, None] = {}
         report = merged(_reports(str(file), away))
@@ -109,7 +111,7 @@ def runnable() -> list[str]:
 
 def _is_there(tag: str) -> bool:
     """Whether a class is one of tools, and has a module here."""
-    of_tools = MODULES.get(tag, "").startswith("osimlite.schema.tools.")
+    of_tools = MODULES.get(tag, "").startswith(("osimlite.schema.tools.", "osimlite.schema.moco.studies"))
     return of_tools and find_spec(f"{__package__}.{module_name(tag)}") is not None
 
 

@@ -1,0 +1,6 @@
+"""Optimal control: the studies of OpenSim's Moco, by direct collocation with exact derivatives.
+
+A study becomes a `problem` (what varies, between which bounds), its equations at one point of the grid become formulas
+(`point`), a `scheme` says how points hang together, `program` is the nonlinear program of all that with sparse exact
+derivatives, and `ipopt` solves it. A goal is one module in `goals`, which is found by the name of its class.
+"""

@@ -1,0 +1,116 @@
+"""Between which bounds what an optimization finds has to be: what the study says, and Moco's rules for the rest."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from osimlite.records import dataclass
+from osimlite.schema.actuators import ActivationCoordinateActuator, ScalarActuator
+from osimlite.schema.base import Component
+from osimlite.schema.moco.parts import MocoVariableInfo
+from osimlite.schema.moco.studies import MocoPhase
+from osimlite.schema.muscles import DeGrooteFregly2016Muscle, Muscle
+
+Range = tuple[float, float]
+FREE: Range = (-math.inf, math.inf)
+LEAST_TENDON_FORCE, MOST_TENDON_FORCE = 0.0, 5.0
+"""Of a normalized tendon force, by ``statebounds_normalized_tendon_force``."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Of one variable.
+
+    Attributes:
+        within: over the whole motion.
+        first: at the start.
+        last: at the end.
+    """
+
+    within: Range
+    first: Range
+    last: Range
+
+    @classmethod
+    def of(cls, within: Range, first: Range = FREE, last: Range = FREE) -> Bounds:
+        """Those at the ends are never wider than the others, as in Moco."""
+        return cls(within, _clipped(first, within), _clipped(last, within))
+
+
+def _clipped(inner: Range, outer: Range) -> Range:
+    return max(inner[0], outer[0]), min(inner[1], outer[1])
+
+
+def range_of(bounds: Any) -> Range | None:
+    """What a ``MocoBounds`` or a list of one or two numbers says; None if it says nothing."""
+    given = tuple(getattr(bounds, "bounds", bounds))
+    return None if not given else (float(given[0]), float(given[-1]))
+
+
+class _Infos:
+    """What the study says of each of some variables."""
+
+    def __init__(
+        self, patterns: Iterable[MocoVariableInfo], infos: Iterable[MocoVariableInfo], names: Sequence[str]
+    ) -> None:
+        self.said: dict[str, MocoVariableInfo] = {}
+        for info in patterns:
+            matches = re.compile(info.name).fullmatch
+            self.said |= {name: info for name in names if matches(name)}
+        self.said |= {info.name: info for info in infos}
+
+    def bounds(self, name: str, otherwise: Range) -> Bounds:
+        info = self.said.get(name)
+        if info is None:
+            return Bounds.of(otherwise)
+        return Bounds.of(
+            range_of(info.bounds) or otherwise,
+            range_of(info.initial_bounds) or FREE,
+            range_of(info.final_bounds) or FREE,
+        )
+
+
+def control_bounds(phase: MocoPhase, names: Sequence[str], components: Mapping[str, Component]) -> dict[str, Bounds]:
+    """Of controls; without any word of the study those of the actuator."""
+    infos = _Infos(phase.control_infos_pattern, phase.control_infos, names)
+    result = {}
+    for name in names:
+        actuator = components.get(name)
+        own = (actuator.min_control, actuator.max_control) if isinstance(actuator, ScalarActuator) else FREE
+        result[name] = infos.bounds(name, own)
+    return result
+
+
+def state_bounds(
+    phase: MocoPhase, names: Sequence[str], components: Mapping[str, Component], controls: Mapping[str, Bounds]
+) -> dict[str, Bounds]:
+    """Of states; values without a word have the range of the coordinate, activations that of the excitation."""
+    infos = _Infos(phase.state_infos_pattern, phase.state_infos, names)
+    speeds = range_of(phase.default_speed_bounds) or FREE
+    result = {}
+    for name in names:
+        path, _, what = name.rpartition("/")
+        owner: Any = components.get(path)
+        otherwise = FREE
+        if what == "value":
+            otherwise = tuple(owner.range)
+        elif what == "speed":
+            otherwise = speeds
+        elif what == "normalized_tendon_force" and isinstance(owner, DeGrooteFregly2016Muscle):
+            otherwise = LEAST_TENDON_FORCE, MOST_TENDON_FORCE
+        elif what == "activation" and isinstance(owner, ActivationCoordinateActuator):
+            otherwise = owner.min_control, owner.max_control
+        elif what == "activation" and isinstance(owner, Muscle) and phase.bound_activation_from_excitation:
+            otherwise = controls[path].within
+        result[name] = infos.bounds(name, otherwise)
+    return result
+
+
+def middle(low: float, high: float) -> float:
+    """Where a search begins: between the bounds, at the only one, or at zero."""
+    if math.isinf(low):
+        return 0.0 if math.isinf(high) else high
+    return low if math.isinf(high) else 0.5 * (low + high)

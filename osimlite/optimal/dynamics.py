@@ -1,0 +1,76 @@
+"""The equations of motion at one point: explicit, implicit, or along a motion that is given."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from osimlite.backends.symbols import casadi
+from osimlite.optimal.point import Formula, Point
+
+if TYPE_CHECKING:
+    from osimlite.optimal.problem import Problem
+
+
+class Dynamics:
+    """What rates are, and what must be zero, at a point.
+
+    Multipliers are variables of their own at all points, and push as ``Gᵀ multipliers``; the model's constraints are
+    equations of points of the mesh (M. Posa et al., ICRA 2016).
+
+    Attributes:
+        is_implicit: whether accelerations are variables.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.functions = problem, problem.functions
+        self.is_implicit = problem.solver.multibody_dynamics_mode == "implicit"
+        self.size = len(self.functions.coordinates)
+
+    def rates(self, point: Point) -> Formula:
+        """The derivative of the whole state."""
+        size, f = self.size, self.functions
+        speeds = point.x[size : 2 * size]
+        if self.is_implicit:
+            accelerations = point.derivatives[:size]
+        elif f.constraints_kept:
+            # M udot = what pushes; the factor of the mass matrix is sparse where the bodies' tree is.
+            none = casadi.SX.zeros(len(f.states))
+            missing = f.residual(point.t, point.x, none, point.u, point.p, point.multipliers)[size : 2 * size]
+            symbol = casadi.SX.sym("udot", len(f.states))
+            rows = f.residual(point.t, point.x, symbol, point.u, point.p, point.multipliers)[size : 2 * size]
+            mass = casadi.jacobian(rows, symbol[size : 2 * size])
+            accelerations = casadi.ldl_solve(-missing, *casadi.ldl(mass))
+        else:
+            return casadi.vertcat(speeds, f.dynamics(point.t, point.x, point.u, point.p)[size:])
+        return casadi.vertcat(speeds, accelerations, self._auxiliary(point))
+
+    def _auxiliary(self, point: Point) -> Formula:
+        """Rates of the auxiliary states by the laws."""
+        none, f = casadi.SX.zeros(len(self.functions.states)), self.functions
+        return -f.residual(point.t, point.x, none, point.u, point.p, point.multipliers)[2 * self.size :]
+
+    def corrected(self, point: Point) -> Formula:
+        """The rates, with the correction of velocities that keeps states on the constraints."""
+        rates = point.rates
+        if not point.slacks.numel():
+            return rates
+        g = self.functions.constraints(point.t, point.x, rates, point.p)[3]
+        return casadi.vertcat(rates[: self.size] + g.T @ point.slacks, rates[self.size :])
+
+    def residuals(self, point: Point) -> tuple[list[str], Formula]:
+        """What must be zero at all points, with its names."""
+        if not self.is_implicit:
+            return [], casadi.SX(0, 1)
+        f, size = self.functions, self.size
+        rows = f.residual(point.t, point.x, point.rates, point.u, point.p, point.multipliers)[size : 2 * size]
+        return [f"{path} residual" for path in f.coordinates], rows
+
+    def constraint_errors(self, point: Point, with_derivatives: bool) -> tuple[list[str], Formula]:
+        """Errors of the model's constraints, with their names."""
+        f = self.functions
+        position, velocity, acceleration, _ = f.constraints(point.t, point.x, point.rates, point.p)
+        own = self.problem.constraint_names
+        if not with_derivatives:
+            return own, position
+        names = [*own, *(f"{name}d" for name in own), *(f"{name}dd" for name in own)]
+        return names, casadi.vertcat(position, velocity, acceleration)

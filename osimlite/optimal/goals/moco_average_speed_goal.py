@@ -1,0 +1,18 @@
+"""How far the average speed of the mass centre is from a given one."""
+
+from __future__ import annotations
+
+from osimlite.backends.symbols import casadi
+from osimlite.optimal.point import CONSTRAINT, Ends, Formula, Terms
+from osimlite.optimal.problem import Problem
+from osimlite.schema.moco.goals import MocoAverageSpeedGoal
+
+
+def terms(goal: MocoAverageSpeedGoal, problem: Problem) -> Terms:
+    """The wanted speed less the way of the mass centre over the duration, m/s."""
+
+    def value(ends: Ends) -> Formula:
+        way = casadi.norm_2(ends.end.mass_center() - ends.start.mass_center())
+        return goal.desired_average_speed - way / ends.duration
+
+    return Terms(value, modes=CONSTRAINT)

@@ -1,0 +1,21 @@
+"""Controls, each to a power, over the motion."""
+
+from __future__ import annotations
+
+from osimlite.backends.symbols import casadi
+from osimlite.optimal.point import Formula, Point, Terms, integral
+from osimlite.optimal.problem import Problem
+from osimlite.schema.moco.goals import MocoControlGoal
+
+
+def terms(goal: MocoControlGoal, problem: Problem) -> Terms:
+    """The integral of the weighted sum of powers of the controls' sizes."""
+    controls = problem.functions.controls
+    weights = problem.weights(goal, goal.control_weights, goal.control_weights_pattern, controls, "control")
+    power = goal.exponent
+
+    def integrand(point: Point) -> Formula:
+        sizes = point.u if power % 2 == 0 else casadi.fabs(point.u)
+        return casadi.dot(casadi.DM(weights), sizes**power)
+
+    return integral(integrand)

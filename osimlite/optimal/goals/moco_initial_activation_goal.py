@@ -1,0 +1,20 @@
+"""Activations equal to excitations at the start."""
+
+from __future__ import annotations
+
+from osimlite.backends.symbols import casadi
+from osimlite.optimal.point import CONSTRAINT, Ends, Formula, Terms
+from osimlite.optimal.problem import Problem
+from osimlite.schema.moco.goals import MocoInitialActivationGoal
+
+
+def terms(goal: MocoInitialActivationGoal, problem: Problem) -> Terms:
+    """For each muscle with an activation, excitation less activation."""
+    muscles = [name for name in problem.functions.controls if f"{name}/activation" in problem.functions.states]
+
+    def value(ends: Ends) -> Formula:
+        start = ends.start
+        differences = [start.control(name) - start.state(f"{name}/activation") for name in muscles]
+        return casadi.vertcat(*differences) if differences else casadi.SX(0, 1)
+
+    return Terms(value, modes=CONSTRAINT)

@@ -1,0 +1,20 @@
+"""Squares of states over the motion."""
+
+from __future__ import annotations
+
+import re
+
+from osimlite.backends.symbols import casadi
+from osimlite.optimal.point import Terms, integral
+from osimlite.optimal.problem import Problem
+from osimlite.schema.moco.goals import MocoSumSquaredStateGoal
+
+
+def terms(goal: MocoSumSquaredStateGoal, problem: Problem) -> Terms:
+    """The integral of the weighted sum of squares of those states whose paths match the pattern."""
+    states = problem.functions.states
+    weights = problem.weights(goal, goal.state_weights, None, states, "state")
+    if goal.pattern is not None:
+        matches = re.compile(goal.pattern).fullmatch
+        weights = [weight if matches(name) else 0.0 for weight, name in zip(weights, states, strict=True)]
+    return integral(lambda point: casadi.dot(casadi.DM(weights), point.x**2))

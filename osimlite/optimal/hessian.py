@@ -1,0 +1,73 @@
+"""The exact Hessian of the Lagrangian of a nonlinear program."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from osimlite.backends.symbols import casadi
+from osimlite.multibody.spatial import Array
+from osimlite.optimal.program import Program
+
+
+class Hessian:
+    """Second derivatives of ``factor f + multipliers · g``, of which CasADi wants the upper half.
+
+    Attributes:
+        sparsity: of the numbers that `numbers` gives.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        sparse, width = program._sparse, len(program.layout.lower)
+        for sort in program.sorts:
+            sort.make_hessian()
+        rows, columns = program._entries("hessian_rows", "hessian_columns")
+        direct, pattern = len(program.end_columns), program._end_hessian_pattern
+        if pattern[direct:, direct:].any():
+            raise program.problem.refused(
+                program.problem.solver,
+                "a goal is not linear in its integral; take optim_hessian_approximation limited-memory",
+            )
+        inner, outer = np.nonzero(np.triu(pattern[:direct, :direct]))
+        inner, outer = np.sort([program.end_columns[inner], program.end_columns[outer]], axis=0)
+        self._ends = np.nonzero(np.triu(pattern[:direct, :direct]))
+        # What depends on an end and on an integral together couples that end with all points.
+        self._mixed = [tuple(pair) for pair in np.argwhere(pattern[:direct, direct:])]
+        far = [
+            np.unique(program._jacobian_columns[program._jacobian_rows == program._rows + k]) for _, k in self._mixed
+        ]
+        self._far = far
+        near = [
+            np.sort([np.full(len(each), program.end_columns[i]), each], axis=0)
+            for (i, _), each in zip(self._mixed, far, strict=True)
+        ]
+        parts = [(rows, columns), (inner, outer), *((pair[0], pair[1]) for pair in near)]
+        keys = np.concatenate([c.astype(np.int64) * width + r for r, c in parts])
+        unique, inverse = np.unique(keys, return_inverse=True)
+        self._map = sparse.csr_matrix(
+            (np.ones(len(keys)), (inverse, np.arange(len(keys)))), shape=(len(unique), len(keys))
+        )
+        self.sparsity = casadi.Sparsity.triplet(width, width, (unique % width).tolist(), (unique // width).tolist())
+
+    def numbers(self, w: Array, factor: float, multipliers: Array) -> Array:
+        """In the order of `sparsity`."""
+        program, direct = self.program, len(self.program.end_columns)
+        totals = program._rows_of(w)[program._rows :]
+        given = program._end_given(w, totals)
+        own, at_ends = multipliers[: program._rows], multipliers[program._rows :]
+        cost, wanted = (np.array(part) for part in program._end_slope(*given))
+        of_integrals = factor * cost.ravel()[direct:] + at_ends @ wanted[:, direct:]
+        push = program._b.T @ np.concatenate([own, of_integrals])
+        parts = []
+        for sort, first in zip(program.sorts, program._offsets, strict=False):
+            count = sort.rows * len(sort.numbers)
+            each = push[first : first + count].reshape(len(sort.numbers), sort.rows).T
+            parts.append(np.array(sort.curvature(*program._given(sort, w), each)).T.ravel())
+        ends = np.array(program._end_curvature(*given, factor, at_ends))
+        parts.append(ends[self._ends])
+        if self._mixed:
+            integrals = program._slopes(w)[3]
+            for (i, k), far in zip(self._mixed, self._far, strict=True):
+                twice = np.where(far == program.end_columns[i], 2.0, 1.0)
+                parts.append(ends[i, direct + k] * integrals[k, far] * twice)
+        return self._map @ np.concatenate(parts)

@@ -1,0 +1,309 @@
+"""Ipopt, with a nonlinear program's own derivatives and with progress that a person can follow."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from osimlite.backends.symbols import casadi
+from osimlite.errors import SimulationError
+from osimlite.multibody.spatial import Array
+from osimlite.optimal.hessian import Hessian
+from osimlite.optimal.program import Program
+from osimlite.records import dataclass
+
+NEAR = 1e-4
+"""Of two iterates that violate nothing by more than this the cheaper one is the better."""
+
+
+@dataclass(frozen=True)
+class Violation:
+    """A constraint that is not fulfilled.
+
+    Attributes:
+        name: of what should hold.
+        time: s; None for what concerns both ends.
+        size: by how much it is missed.
+    """
+
+    name: str
+    time: float | None
+    size: float
+
+    def __str__(self) -> str:
+        where = "" if self.time is None else f" at {self.time:.4g} s"
+        return f"{self.name}{where} ({self.size:.2g})"
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where the search is.
+
+    Attributes:
+        iteration: number of it.
+        objective: what is made small.
+        worst: the largest violation; None without any.
+    """
+
+    iteration: int
+    objective: float
+    worst: Violation | None
+
+    def __str__(self) -> str:
+        worst = "" if self.worst is None else f"  largest violation {self.worst}"
+        return f"{self.iteration:5d}  objective {self.objective:.8g}{worst}"
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What came out.
+
+    Attributes:
+        w: the variables.
+        status: in Ipopt's words.
+        success: whether it is a solution to the tolerances.
+        iterations: that were taken.
+        duration: of the search, s.
+    """
+
+    w: Array
+    status: str
+    success: bool
+    iterations: int
+    duration: float
+
+
+def violations(program: Program, w: Array, rows: Array | None = None, most: int = 10) -> list[Violation]:
+    """The largest ones, the largest first.
+
+    Args:
+        program: that they are of.
+        w: the variables.
+        rows: the values of g at w, if they are known.
+        most: how many at most.
+    """
+    rows = program.values(w)[1] if rows is None else rows
+    size = np.maximum(np.maximum(program.lower - rows, rows - program.upper), 0.0)
+    size = np.where(np.isfinite(size), size, np.inf)
+    result = []
+    for row in np.argsort(-size)[:most]:
+        if size[row] > 0.0:
+            place = program.times[row]
+            time = None if np.isnan(place) else float(w[0] + place * (w[1] - w[0]))
+            result.append(Violation(program.labels[row], time, float(size[row])))
+    return result
+
+
+def solve(program: Program, guess: Array, tell: Callable[[Progress], None] | None = None) -> Found:
+    """Look for the least objective from a guess.
+
+    An interrupt (Ctrl-C) ends the search, and the best that was found is what comes out.
+
+    Args:
+        program: that is solved.
+        guess: to start from.
+        tell: is told of each iteration.
+    """
+    settings = program.problem.solver
+    search = _Search(program, tell)
+    options = {
+        "ipopt": _options(program) | {"print_level": 0, "sb": "yes"},
+        "print_time": False,
+        "show_eval_warnings": False,
+        "no_nlp_grad": True,
+        "calc_lam_p": False,
+        "calc_lam_x": False,
+        "iteration_callback": search,
+        "grad_f": search.gradient,
+        "jac_g": search.jacobian,
+    }
+    if settings.optim_hessian_approximation == "exact":
+        options["hess_lag"] = _curved(program)
+    before = time.perf_counter()
+    solver = casadi.nlpsol("moco", "ipopt", search.program_itself, options)
+    with search.interruptible():
+        found = solver(
+            x0=np.clip(guess, program.layout.lower, program.layout.upper),
+            lbx=program.layout.lower,
+            ubx=program.layout.upper,
+            lbg=program.lower,
+            ubg=program.upper,
+        )
+    took, stats = time.perf_counter() - before, solver.stats()
+    status = stats["return_status"]
+    if not np.isfinite(np.array(found["f"])).all() or status == "Invalid_Number_Detected":
+        raise SimulationError(_no_number(program, guess))
+    w = np.array(found["x"]).ravel()
+    if not stats["success"] and search.best is not None:
+        w = search.best
+    return Found(w, status, bool(stats["success"]), int(stats["iter_count"]), took)
+
+
+def _options(program: Program) -> dict[str, Any]:
+    """As Moco sets them."""
+    settings, options = program.problem.solver, dict[str, Any]()
+    options["hessian_approximation"] = settings.optim_hessian_approximation
+    if settings.optim_max_iterations != -1:
+        options["max_iter"] = settings.optim_max_iterations
+    if (tolerance := settings.optim_convergence_tolerance) != -1.0:
+        both = ("", "dual_inf_", "compl_inf_")
+        options |= {f"{sort}{each}tol": tolerance for sort in ("", "acceptable_") for each in both}
+    if (tolerance := settings.optim_constraint_tolerance) != -1.0:
+        options |= {f"{sort}constr_viol_tol": tolerance for sort in ("", "acceptable_")}
+    return options
+
+
+def _no_number(program: Program, guess: Array) -> str:
+    costs, rows = program.values(guess)
+    bad = [program.labels[row] for row in np.flatnonzero(~np.isfinite(rows))[:1]]
+    bad += [name for name, cost in zip(program.costs, costs, strict=True) if not np.isfinite(cost)]
+    what = f"'{bad[0]}' is no number at the guess" if bad else "something is no number on the way"
+    return f"{what}; give a guess_file from which the model can move, or closer bounds"
+
+
+class _Function(casadi.Callback):  # type: ignore[misc]
+    """A function of CasADi that computes with arrays."""
+
+    def __init__(self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], law: Callable[..., Any]) -> None:
+        casadi.Callback.__init__(self)
+        self._inputs, self._outputs, self._law = inputs, outputs, law
+        self.construct(name, {})
+
+    def get_n_in(self) -> int:
+        return len(self._inputs)
+
+    def get_n_out(self) -> int:
+        return len(self._outputs)
+
+    def get_name_in(self, place: int) -> str:
+        return [*self._inputs][place]
+
+    def get_name_out(self, place: int) -> str:
+        return [*self._outputs][place]
+
+    def get_sparsity_in(self, place: int) -> Any:
+        return [*self._inputs.values()][place]
+
+    def get_sparsity_out(self, place: int) -> Any:
+        return [*self._outputs.values()][place]
+
+    def has_eval_buffer(self) -> bool:
+        return True
+
+    def eval_buffer(self, given: Any, results: Any) -> int:
+        # What is not given, or not asked for, is None.
+        arrays = [np.zeros(0) if item is None else np.frombuffer(item, dtype=float) for item in given]
+        for place, result in zip(results, self._law(*arrays), strict=True):
+            if place is not None:
+                np.frombuffer(place, dtype=float)[:] = result
+        return 0
+
+
+def _column(size: int) -> Any:
+    return casadi.Sparsity.dense(size, 1)
+
+
+class _Search(casadi.Callback):  # type: ignore[misc]
+    """The functions that Ipopt asks, and what it tells after each iteration."""
+
+    def __init__(self, program: Program, tell: Callable[[Progress], None] | None) -> None:
+        casadi.Callback.__init__(self)
+        self.program, self.tell, self.stops, self.count = program, tell, False, 0
+        self.best: Array | None = None
+        self._best = (np.inf, np.inf)
+        self._at: Array | None = None
+        self._slopes: Any = None
+        width, rows = len(program.layout.lower), len(program.labels)
+        given = {"x": _column(width), "p": casadi.Sparsity(0, 0)}
+        self._sizes = {"f": 1, "x": width, "lam_x": width, "g": rows, "lam_g": rows, "lam_p": 0}
+        scalar, across = casadi.Sparsity.scalar(), casadi.Sparsity.dense(width, 1)
+        self.program_itself = _Function("nlp", given, {"f": scalar, "g": _column(rows)}, self._values)
+        self.gradient = _Function("nlp_grad_f", given, {"f": scalar, "grad_f_x": across}, self._gradient)
+        self.jacobian = _Function(
+            "nlp_jac_g", given, {"g": _column(rows), "jac_g_x": program.jacobian_sparsity}, self._jacobian
+        )
+        self.construct("told", {})
+
+    def _values(self, w: Array, *_: Array) -> tuple[Any, ...]:
+        costs, rows = self.program.values(w)
+        return costs.sum(), rows
+
+    def _both(self, w: Array) -> tuple[Array, Array]:
+        if self._at is None or not np.array_equal(self._at, w):
+            self._at, self._slopes = w.copy(), self.program.slopes(w)
+        return self._slopes
+
+    def _gradient(self, w: Array, *_: Array) -> tuple[Any, ...]:
+        return 0.0, self._both(w)[0]
+
+    def _jacobian(self, w: Array, *_: Array) -> tuple[Any, ...]:
+        return np.zeros(len(self.program.labels)), self._both(w)[1]
+
+    # ---------------------------------------------------------------------------------------- after an iteration
+    def get_n_in(self) -> int:
+        return casadi.nlpsol_n_out()
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_name_in(self, place: int) -> str:
+        return casadi.nlpsol_out(place)
+
+    def get_name_out(self, place: int) -> str:
+        return "stops"
+
+    def get_sparsity_in(self, place: int) -> Any:
+        return _column(self._sizes.get(casadi.nlpsol_out(place), 0))
+
+    def eval(self, given: Any) -> Any:
+        names = {casadi.nlpsol_out(place): place for place in range(len(given))}
+        w, rows = (np.array(given[names[name]]).ravel() for name in ("x", "g"))
+        objective = float(given[names["f"]])
+        found = violations(self.program, w, rows, most=1)
+        size = found[0].size if found else 0.0
+        rank = (size, np.inf) if size > NEAR else (0.0, objective)
+        if rank < self._best:
+            self.best, self._best = w, rank
+        if self.tell is not None:
+            self.tell(Progress(self.count, objective, found[0] if found else None))
+        self.count += 1
+        return [1.0 if self.stops else 0.0]
+
+    @contextmanager
+    def interruptible(self) -> Iterator[None]:
+        """The first Ctrl-C ends the search after the iteration, the second at once."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        before = signal.getsignal(signal.SIGINT)
+
+        def stop(*_: Any) -> None:
+            self.stops = True
+            signal.signal(signal.SIGINT, before)
+
+        signal.signal(signal.SIGINT, stop)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+
+def _curved(program: Program) -> Any:
+    hessian = Hessian(program)
+    given = {
+        "x": _column(len(program.layout.lower)),
+        "p": casadi.Sparsity(0, 0),
+        "lam_f": casadi.Sparsity.scalar(),
+        "lam_g": _column(len(program.labels)),
+    }
+
+    def law(w: Array, *rest: Array) -> tuple[Any, ...]:
+        return (hessian.numbers(w, float(rest[-2][0]), rest[-1]),)
+
+    return _Function("nlp_hess_l", given, {"hess_gamma_x_x": hessian.sparsity}, law)

@@ -1,0 +1,101 @@
+"""Where each variable of the nonlinear program is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from osimlite.multibody.spatial import Array
+from osimlite.optimal.bounds import Bounds, middle, range_of
+
+if TYPE_CHECKING:
+    from osimlite.optimal.problem import Problem
+
+KINDS = "states", "controls", "multipliers", "derivatives", "slacks"
+"""What a point may have variables of, in this order."""
+
+
+class Layout:
+    """The variables: initial and final time, parameters, and then those of one point after the other.
+
+    Attributes:
+        names: by kind the names of the variables of a point.
+        shared: how many there are before those of the first point.
+        places: for each point the places of its variables.
+        lower: bounds (n,).
+        upper: bounds (n,).
+        places_of: by kind the places (points, names); -1 where a point has none.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        functions, grid, solver = problem.functions, problem.grid, problem.solver
+        self.problem = problem
+        multipliers = [f"lambda_{name}" for name in problem.constraint_names]
+        accelerations = [f"{path}/accel" for path in functions.coordinates] if problem.dynamics.is_implicit else []
+        self.names: dict[str, list[str]] = {
+            "states": [*functions.states],
+            "controls": [*functions.controls],
+            "multipliers": multipliers,
+            "derivatives": accelerations,
+            "slacks": problem.slack_names,
+        }
+        force = range_of(problem.phase.multiplier_bounds) or (-np.inf, np.inf)
+        acceleration = range_of(solver.implicit_multibody_acceleration_bounds) or (-np.inf, np.inf)
+        correction = range_of(solver.velocity_correction_bounds) or (-np.inf, np.inf)
+        self.bounds: dict[str, list[Bounds]] = {
+            "states": [*problem.states.values()],
+            "controls": [*problem.controls.values()],
+            "multipliers": [Bounds.of(force)] * len(multipliers),
+            "derivatives": [Bounds.of(acceleration)] * len(accelerations),
+            "slacks": [Bounds.of(correction)] * len(problem.slack_names),
+        }
+        self.shared = 2 + len(problem.parameters)
+        lower, upper = [*zip(*problem.times, *problem.parameters.values(), strict=True)]
+        self.places: list[Any] = []
+        self.places_of = {kind: np.full((len(grid.places), len(self.names[kind])), -1) for kind in KINDS}
+        lows, highs, size, end = [*lower], [*upper], self.shared, len(grid.places) - 1
+        for point in range(len(grid.places)):
+            first = size
+            for kind in KINDS:
+                if kind == "slacks" and grid.is_mesh[point]:
+                    continue
+                for number, bounds in enumerate(self.bounds[kind]):
+                    low, high = bounds.first if point == 0 else bounds.last if point == end else bounds.within
+                    lows.append(low)
+                    highs.append(high)
+                    self.places_of[kind][point, number] = size
+                    size += 1
+            self.places.append(np.arange(first, size))
+        self.lower, self.upper = np.array(lows, float), np.array(highs, float)
+
+    def guess(self) -> Array:
+        """The middle between the bounds of each, as Moco begins."""
+        return np.array([middle(low, high) for low, high in zip(self.lower, self.upper, strict=True)])
+
+    def taken(self, trajectory: Any) -> Array:
+        """A guess from a trajectory, linear between its times; what it has not is in the middle of its bounds."""
+        result, times = self.guess(), trajectory.times
+        result[:2] = times[0], times[-1]
+        at = times[0] + self.problem.grid.places * (times[-1] - times[0])
+        for kind in KINDS:
+            for number, name in enumerate(self.names[kind]):
+                column = trajectory.columns.get(name)
+                if column is not None:
+                    places = self.places_of[kind][:, number]
+                    known = np.isfinite(column)
+                    result[places[places >= 0]] = np.interp(at, times[known], column[known])[places >= 0]
+        for number, name in enumerate(self.problem.parameters):
+            if name in trajectory.parameters:
+                result[2 + number] = trajectory.parameters[name]
+        return result
+
+    def name_at(self, place: int) -> str:
+        """What a variable is, and where."""
+        if place < self.shared:
+            return ["initial time", "final time", *self.problem.parameters][place]
+        for kind in KINDS:
+            found = np.argwhere(self.places_of[kind] == place)
+            if len(found):
+                return self.names[kind][found[0][1]]
+        return ""

@@ -1,0 +1,142 @@
+"""Formulas at one point of the grid: what goals and constraints are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from osimlite.backends.symbols import casadi
+from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass, field
+
+if TYPE_CHECKING:
+    from osimlite.optimal.problem import Problem
+
+Formula = Any
+"""An ``SX`` of CasADi."""
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """A function of time that is given, such as a measured angle.
+
+    Attributes:
+        number: among those of the problem.
+        values: at times (n,) the value and both of its derivatives (3, n).
+    """
+
+    number: int
+    values: Callable[[Array], Array]
+
+
+@dataclass(eq=False)
+class Point:
+    """Symbols, and what follows from them, at one moment of the motion.
+
+    Attributes:
+        problem: that is solved.
+        t: time, s.
+        x: the whole state in the order of `problem.functions.states`, what is prescribed included.
+        u: controls, in the order of `problem.functions.controls`.
+        multipliers: of the model's constraints.
+        derivatives: that are variables: accelerations, and rates of auxiliary states; empty if explicit.
+        slacks: of velocity corrections, if the point has them.
+        p: parameters.
+        known: what the series are made of: the time that they are expanded about, and three numbers for each.
+    """
+
+    problem: Problem
+    t: Formula
+    x: Formula
+    u: Formula
+    multipliers: Formula
+    derivatives: Formula
+    slacks: Formula
+    p: Formula
+    known: Formula
+    _kept: dict[str, Any] = field(default_factory=dict)
+
+    def state(self, path: str) -> Formula:
+        """The state of a path."""
+        return self.x[self.problem.functions.states.index(path)]
+
+    def control(self, path: str) -> Formula:
+        """The control of a path."""
+        return self.u[self.problem.functions.controls.index(path)]
+
+    def at(self, series: Series) -> Formula:
+        """What a series is at this time; exact to the second derivative, as the numbers are renewed for each time."""
+        first, since = 1 + 3 * series.number, self.t - self.known[0]
+        return self.known[first] + since * (self.known[first + 1] + 0.5 * since * self.known[first + 2])
+
+    @cached_property
+    def rates(self) -> Formula:
+        """The derivative of the whole state, of which speeds and accelerations are those of the dynamics mode."""
+        return self.problem.dynamics.rates(self)
+
+    @property
+    def accelerations(self) -> Formula:
+        """Of the coordinates, in the order of `problem.functions.coordinates`."""
+        size = len(self.problem.functions.coordinates)
+        return self.rates[size : 2 * size]
+
+    def output(self, name: str) -> dict[str, Formula]:
+        """What is computed of the model under one of the names of ``functions.outputs``, by its labels."""
+        functions = self.problem.functions
+        if not self._kept:
+            values = functions.outputs(self.t, self.x, self.u, self.p)
+            values = values if isinstance(values, tuple) else (values,)
+            self._kept.update(zip(functions.outputs.name_out(), values, strict=True))
+        labels = functions.output_names[name]
+        return {label: self._kept[name][place] for place, label in enumerate(labels)}
+
+    def mass_center(self) -> Formula:
+        """Of the whole model in ground (3,), m."""
+        return casadi.vertcat(*self.output("mass_center").values())
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """What the value of a goal is made of.
+
+    Attributes:
+        start: the first point.
+        end: the last one.
+        integral: of the goal's integrand over time; None if it has none.
+    """
+
+    start: Point
+    end: Point
+    integral: Formula | None
+
+    @property
+    def duration(self) -> Formula:
+        """S."""
+        return self.end.t - self.start.t
+
+
+COST = ("cost",)
+BOTH = "cost", "endpoint_constraint"
+CONSTRAINT = "endpoint_constraint", "cost"
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """What a goal consists of.
+
+    Attributes:
+        value: from both ends, and from the integral over time, the value or the column of values of the goal.
+        integrand: at a point; None if nothing is integrated.
+        modes: that the goal can have, first the one that it has where the study says nothing: COST, BOTH, CONSTRAINT.
+            The cost of a goal that is a constraint first is the sum of the squares of its values, of others the sum.
+    """
+
+    value: Callable[[Ends], Formula]
+    integrand: Callable[[Point], Formula] | None = None
+    modes: tuple[str, ...] = COST
+
+
+def integral(integrand: Callable[[Point], Formula], modes: tuple[str, ...] = COST) -> Terms:
+    """The terms of a goal that is the integral of something over time."""
+    return Terms(lambda ends: ends.integral, integrand, modes)

@@ -1,0 +1,264 @@
+"""An optimal control problem, as a study of Moco says it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite._load import module_name
+from osimlite.backends.functions import casadi as functions_of
+from osimlite.document.kept import read_anew
+from osimlite.errors import DocumentError, UnsupportedError
+from osimlite.multibody.spatial import Array
+from osimlite.optimal.bounds import FREE, Range, control_bounds, range_of, state_bounds
+from osimlite.optimal.dynamics import Dynamics
+from osimlite.optimal.point import Series, Terms
+from osimlite.optimal.schemes import Grid, scheme_named
+from osimlite.schema.base import Component, Object
+from osimlite.schema.controllers import Controller
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.moco.goals import MocoGoal
+from osimlite.schema.moco.parts import MocoWeightSet
+from osimlite.schema.moco.studies import MocoCasADiSolver, MocoStudy
+from osimlite.schema.model import Model
+from osimlite.simulation.files.storage import beside
+from osimlite.text import did_you_mean
+
+NO_RATES = "BallJoint", "EllipsoidJoint", "FreeJoint", "ScapulothoracicJoint"
+"""Joints whose speeds are not the rates of their values: Moco refuses them."""
+
+
+class Problem:
+    """What varies, between which bounds, and what is asked of it.
+
+    Args:
+        study: as it was read or made.
+        file: it stands in, for messages and for the files that it names.
+        folder: that those files are in, if the study is in none; the current folder if None.
+
+    Attributes:
+        study: as given; `phase` and `solver` are its parts.
+        model: that moves.
+        functions: of the model (:class:`~osimlite.backends.functions.CasadiModel`).
+        states: bounds by paths of states, in the order of `functions.states`.
+        controls: likewise of controls.
+        times: ranges of the initial and the final time, s.
+        parameters: ranges by names of parameters.
+        constraint_names: of the equations that the model's constraints make, as OpenSim numbers them.
+        grid: the points.
+        goals: those that count, with what they consist of.
+
+    Raises:
+        UnsupportedError: there is something that is not solved here; it says where in the file.
+        DocumentError: the study says something that cannot be, such as a state that is none.
+    """
+
+    def __init__(self, study: MocoStudy, file: str | Path | None = None, folder: Path | None = None) -> None:
+        self.study, self.file = study, None if file is None else Path(file)
+        self.folder = self.file.parent if self.file is not None else folder or Path(".")
+        self.phase = study.problem.phases
+        self.series: list[Series] = []
+        if not isinstance(study.solver, MocoCasADiSolver):
+            raise self.refused(study.solver, "of solvers only MocoCasADiSolver is known")
+        self.solver: MocoCasADiSolver = study.solver
+        self.model = self._model()
+        self.components = {part.path: part for part in self.model.walk() if isinstance(part, Component)}
+        self._refuse_parts()
+        paths = {parameter.name: self._parameter_paths(parameter) for parameter in self.phase.parameters}
+        self.functions = functions_of(self.model, [path for own in paths.values() for path in own], self.folder)
+        self.parameters: dict[str, Range] = {
+            parameter.name: range_of(parameter.moco_bounds) or FREE for parameter in self.phase.parameters
+        }
+        self.parameter_owners = [place for place, own in enumerate(paths.values()) for _ in own]
+        self._expect_infos()
+        self.controls = control_bounds(self.phase, self.functions.controls, self.components)
+        self.states = state_bounds(self.phase, self.functions.states, self.components, self.controls)
+        self.times = tuple(
+            range_of(bounds) or FREE for bounds in (self.phase.time_initial_bounds, self.phase.time_final_bounds)
+        )
+        self.constraint_names = self._constraint_names()
+        self.grid = Grid.of(scheme_named(self.solver.transcription_scheme), self._mesh())
+        self.dynamics = Dynamics(self)
+        self._refuse_implicit_tendons()
+        self.goals: list[tuple[MocoGoal, Terms]] = [
+            (goal, self._terms(goal)) for goal in self.phase.goals if goal.enabled
+        ]
+        for constraint in self.phase.path_constraints:
+            raise self.refused(constraint, "path constraints are not solved here yet")
+
+    # ------------------------------------------------------------------------------------------------- errors
+    def place(self, name: str) -> Path:
+        """Where a file is that the study names: looked for from its folder, then from the current one."""
+        return beside(self.folder, name.strip())
+
+    def _placed(self, part: Object) -> dict[str, Any]:
+        """Where a part of the study stands: objects know no lines, but their tags and names are in the text."""
+        if self.file is None:
+            return {}
+        tags = re.compile(rf"<{re.escape(type(part).tag)}(\s[^>]*)?/?>")
+        named = re.compile(rf'name="{re.escape(part.name)}"')
+        try:
+            lines = self.file.read_text(encoding="utf-8").splitlines()
+        except (OSError, UnicodeError):
+            return {"file": str(self.file)}
+        found = [(number, text) for number, text in enumerate(lines, 1) if tags.search(text)]
+        found = [pair for pair in found if named.search(pair[1])] or found
+        return {"file": str(self.file), "line": found[0][0] if found else None}
+
+    def refused(self, part: Object, reason: str) -> UnsupportedError:
+        """The error of what is not solved here."""
+        name = f" '{part.name}'" if part.name else ""
+        return UnsupportedError(f"{type(part).tag}{name}: {reason}", **self._placed(part))
+
+    def wrong(self, part: Object, reason: str) -> DocumentError:
+        """The error of what cannot be."""
+        name = f" '{part.name}'" if part.name else ""
+        return DocumentError(f"{type(part).tag}{name}: {reason}", **self._placed(part))
+
+    def expect(self, part: Object, name: str, known: Iterable[str], what: str) -> None:
+        """Refuse a name that is none, with the nearest one that is.
+
+        Raises:
+            DocumentError: it is none.
+        """
+        known = [*known]
+        if name not in known:
+            raise self.wrong(part, f"the model has no {what} '{name}'{did_you_mean(name, known)}")
+
+    # --------------------------------------------------------------------------------------- for goals and tools
+    def weights(
+        self, part: Object, by_name: MocoWeightSet, by_pattern: MocoWeightSet | None, names: Sequence[str], what: str
+    ) -> list[float]:
+        """How much each of some names counts: by its name, else by the last pattern that matches, else one."""
+        own = {weight.name: weight.weight for weight in by_name.objects}
+        for name in own:
+            self.expect(part, name, names, what)
+        found = dict.fromkeys(names, 1.0)
+        for weight in by_pattern.objects if by_pattern is not None else ():
+            matches = re.compile(weight.name).fullmatch
+            found |= {name: weight.weight for name in names if matches(name)}
+        return [*(found | own).values()]
+
+    def given(self, values: Callable[[Array], Array]) -> Series:
+        """A function of time that is given, for formulas at points (``point.at(series)``).
+
+        Args:
+            values: at times (n,) the value and both of its derivatives by time (3, n).
+        """
+        series = Series(len(self.series), values)
+        self.series.append(series)
+        return series
+
+    # ------------------------------------------------------------------------------------------------- parts
+    def _model(self) -> Model:
+        processor = self.phase.model
+        for operator in processor.operators:
+            raise self.refused(operator, "operators on models are not applied here yet; print the processed model")
+        if processor.filepath.strip():
+            return read_anew(self.place(processor.filepath), Model)
+        if processor.model is None:
+            raise self.wrong(processor, "it has no model and names none")
+        return processor.model
+
+    def _refuse_parts(self) -> None:
+        for part in self.components.values():
+            if isinstance(part, Coordinate) and part.locked:
+                raise self.wrong(self.phase, f"{part.path} is locked, which Moco refuses; take a WeldJoint instead")
+            if isinstance(part, Controller) and part.enabled:
+                message = f"the model's {type(part).tag} '{part.path}' would set controls; leave it out"
+                raise self.refused(self.phase, message)
+            if type(part).tag in NO_RATES:
+                message = f"{type(part).tag} '{part.path}' has speeds that are no rates, which Moco refuses, too"
+                raise self.wrong(self.phase, f"{message}; take a CustomJoint")
+            if type(part).tag == "PositionMotion":
+                raise self.refused(self.phase, f"a motion that is given (PositionMotion '{part.path}')")
+
+    def _refuse_implicit_tendons(self) -> None:
+        for part in self.components.values():
+            mode = getattr(part, "tendon_compliance_dynamics_mode", "explicit")
+            if mode == "implicit" and not getattr(part, "ignore_tendon_compliance", True):
+                message = (
+                    f"the tendon of {part.path} is of the implicit kind; take tendon_compliance_dynamics_mode explicit"
+                )
+                raise self.refused(self.phase, message)
+
+    def _parameter_paths(self, parameter: Any) -> list[str]:
+        element = parameter.property_element
+        behind = "" if element is None else f"/{element}"
+        return [f"{str(path).rstrip('/')}/{parameter.property_name}{behind}" for path in parameter.component_paths]
+
+    def _expect_infos(self) -> None:
+        for infos, known, what in (
+            (self.phase.state_infos, self.functions.states, "state"),
+            (self.phase.control_infos, self.functions.controls, "control"),
+        ):
+            for info in infos:
+                self.expect(info, info.name, known, what)
+        for info in (*self.phase.input_control_infos, *self.phase.input_control_infos_pattern):
+            raise self.refused(info, "inputs of controllers are not solved here")
+
+    def _constraint_names(self) -> list[str]:
+        count = self.functions.constraints_kept
+        if not count:
+            return []
+        solver = self.solver
+        if solver.kinematic_constraint_method != "Posa2016":
+            raise self.refused(
+                solver,
+                f"constraints of the model are met by Posa2016 only, and not by {solver.kinematic_constraint_method}",
+            )
+        if solver.transcription_scheme != "hermite-simpson" and solver.enforce_constraint_derivatives:
+            message = "constraints of the model with Posa2016 need transcription_scheme hermite-simpson, as in Moco"
+            raise self.wrong(solver, message)
+        f = self.functions
+        positions = f.constraints.size1_out(0)
+        if positions != count:
+            raise self.refused(self.phase, "the model has constraints that bind speeds alone, which Posa2016 cannot")
+        # OpenSim numbers constraints behind those that lock coordinates.
+        coordinates = [part for part in self.components.values() if isinstance(part, Coordinate)]
+        first = sum(1 + (part.prescribed_function is not None) for part in coordinates)
+        return [f"cid{first + number}_p{row}" for number, row in _by_constraint(self.model, count)]
+
+    def _mesh(self) -> Array:
+        solver = self.solver
+        if not solver.mesh:
+            return np.linspace(0.0, 1.0, solver.num_mesh_intervals + 1)
+        mesh = np.array(solver.mesh)
+        if mesh[0] != 0.0 or mesh[-1] != 1.0 or np.any(np.diff(mesh) <= 0.0):
+            raise self.wrong(solver, "the mesh has to rise from 0 to 1")
+        return mesh
+
+    def _terms(self, goal: MocoGoal) -> Terms:
+        place = f"{__package__}.goals.{module_name(type(goal).tag)}"
+        if find_spec(place) is None:
+            raise self.refused(goal, "goals of this class are not solved here yet")
+        for factor in goal.scale_factors:
+            raise self.refused(factor, "scale factors are not found here yet")
+        terms: Terms = import_module(place).terms(goal, self)
+        if goal.mode is not None and goal.mode not in terms.modes:
+            raise self.wrong(goal, f"it cannot be of mode '{goal.mode}', as in Moco; it is a {terms.modes[0]}")
+        return terms
+
+    @cached_property
+    def slack_names(self) -> list[str]:
+        """Of the corrections of velocities."""
+        wanted = self.solver.enforce_constraint_derivatives
+        return [f"gamma_{name}" for name in self.constraint_names] if wanted else []
+
+
+def _by_constraint(model: Model, count: int) -> Iterable[tuple[int, int]]:
+    """For each equation the number of its constraint and its own."""
+    sizes = {"WeldConstraint": 6, "PointConstraint": 3}
+    rows: list[tuple[int, int]] = []
+    constraints: Mapping[str, Any] = {part.path: part for part in model.constraint_set.objects}
+    kept = [part for part in constraints.values() if part.isEnforced]
+    for number, part in enumerate(kept):
+        rows += [(number, row) for row in range(sizes.get(type(part).tag, 1))]
+    return rows if len(rows) == count else [(row, 0) for row in range(count)]

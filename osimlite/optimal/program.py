@@ -1,0 +1,336 @@
+"""The nonlinear program of a problem, with its sparse exact derivatives.
+
+At each point k of the grid one function of CasADi, F(s, z_k), has all that is not linear: rates times the duration,
+residuals, integrands times the duration. s are the times and the parameters, z_k the variables of the point. What must
+be zero is ``A w + B F`` with constant sparse A and B; so Jacobian and Hessian are constant sparse maps of the numbers
+that the functions' own derivatives have, and nothing is differentiated twice. What depends on both ends is one more
+function, E(s, z_0, z_n, integrals).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from osimlite._require import require
+from osimlite.backends.symbols import casadi
+from osimlite.multibody.spatial import Array
+from osimlite.optimal.bounds import range_of
+from osimlite.optimal.layout import KINDS, Layout
+from osimlite.optimal.point import Ends, Point
+from osimlite.optimal.problem import Problem
+
+SX: Any = casadi.SX
+
+
+class PointFunction:
+    """F and its derivatives for the points of one sort, those of the mesh or those between."""
+
+    def __init__(self, program: Program, numbers: list[int]) -> None:
+        problem, layout = program.problem, program.layout
+        self.numbers = np.array(numbers, dtype=int)
+        self.columns = np.array([layout.places[number] for number in numbers])
+        size = self.columns.shape[1]
+        s, z = SX.sym("s", layout.shared), SX.sym("z", size)
+        place, known = SX.sym("place"), SX.sym("known", program.known_size)
+        point = program.point(s, z, place, known, is_mesh=bool(problem.grid.is_mesh[numbers[0]]))
+        duration = s[1] - s[0]
+        names, residuals = problem.dynamics.residuals(point)
+        rows, labels, limits = [residuals], [*names], [(0.0, 0.0)] * len(names)
+        if problem.grid.is_mesh[numbers[0]] and problem.constraint_names:
+            derived = bool(problem.solver.enforce_constraint_derivatives)
+            names, errors = problem.dynamics.constraint_errors(point, derived)
+            rows.append(errors)
+            labels += names
+            limits += [range_of(problem.phase.kinematic_constraint_bounds) or (0.0, 0.0)] * len(names)
+        integrands = [duration * integrand(point) for _, integrand in program.integrals]
+        column = casadi.densify(casadi.vertcat(duration * problem.dynamics.corrected(point), *rows, *integrands))
+        self.labels, self.limits, self.rows = labels, limits, column.numel()
+        given = [s, z, place, known]
+        both, multipliers = casadi.vertcat(s, z), SX.sym("multipliers", self.rows)
+        jacobian = casadi.jacobian(column, both)
+        self.jacobian_rows, self.jacobian_columns = map(np.array, jacobian.sparsity().get_triplet())
+        options, count = {"cse": True}, len(numbers)
+        self.value = casadi.Function("F", given, [column], options).map(count)
+        self.slope = casadi.Function("J", given, [casadi.vertcat(*jacobian.nonzeros())], options).map(count)
+        self._hessian_parts: Any = [*given, multipliers], casadi.dot(multipliers, column), both, count
+
+    def make_hessian(self) -> None:
+        """The second derivatives are only made if they are asked for."""
+        given, combined, both, count = self._hessian_parts
+        hessian = casadi.triu(casadi.hessian(combined, both)[0])
+        self.hessian_rows, self.hessian_columns = map(np.array, hessian.sparsity().get_triplet())
+        self.curvature = casadi.Function("H", given, [casadi.vertcat(*hessian.nonzeros())], {"cse": True}).map(count)
+
+
+class Program:
+    """The nonlinear program: minimize f(w) with lower <= g(w) <= upper.
+
+    Attributes:
+        problem: that is solved.
+        layout: of the variables w.
+        labels: of the rows of g.
+        times: of the rows, from 0 at the start to 1 at the end; of what concerns both ends not a number.
+        lower: bounds of g.
+        upper: bounds of g.
+        costs: names of the parts of f.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.layout = problem, Layout(problem)
+        self.labels: list[str] = []
+        self.times: Array = np.zeros(0)
+        self.lower: Array = np.zeros(0)
+        self.upper: Array = np.zeros(0)
+        self._sparse = require("scipy.sparse", extra="sim", purpose="optimal control")
+        self.known_size = 1 + 3 * len(problem.series)
+        self.integrals = [(goal, terms.integrand) for goal, terms in problem.goals if terms.integrand is not None]
+        points, is_mesh = range(len(problem.grid.places)), problem.grid.is_mesh
+        sorts = [[k for k in points if is_mesh[k]], [k for k in points if not is_mesh[k]]]
+        if not problem.constraint_names:
+            sorts = [[*points]]
+        self.sorts = [PointFunction(self, numbers) for numbers in sorts if numbers]
+        self._offsets = np.cumsum([0, *(sort.rows * len(sort.numbers) for sort in self.sorts)])
+        self._assemble()
+        self._make_ends()
+        self._map_jacobian()
+        self._map_ends()
+
+    # --------------------------------------------------------------------------------------------- formulas
+    def point(self, s: Any, z: Any, place: Any, known: Any, *, is_mesh: bool) -> Point:
+        """The formulas at a point of the grid."""
+        parts, first = {}, 0
+        for kind in KINDS:
+            count = 0 if kind == "slacks" and is_mesh else len(self.layout.names[kind])
+            parts[kind] = z[first : first + count]
+            first += count
+        parameters = [s[2 + owner] for owner in self.problem.parameter_owners]
+        return Point(
+            problem=self.problem,
+            t=s[0] + place * (s[1] - s[0]),
+            x=parts["states"],
+            u=parts["controls"],
+            multipliers=parts["multipliers"],
+            derivatives=parts["derivatives"],
+            slacks=parts["slacks"],
+            p=casadi.vertcat(*parameters) if parameters else SX(0, 1),
+            known=known,
+        )
+
+    def _make_ends(self) -> None:
+        """E: the parts of the cost, and what goals want to be zero at the ends."""
+        problem, layout = self.problem, self.layout
+        size, last = layout.shared, len(layout.places) - 1
+        s = SX.sym("s", size)
+        z0, z1 = SX.sym("z0", len(layout.places[0])), SX.sym("z1", len(layout.places[last]))
+        totals = SX.sym("integrals", len(self.integrals))
+        known = [SX.sym(f"known{k}", self.known_size) for k in range(2)]
+        start = self.point(s, z0, SX(0.0), known[0], is_mesh=True)
+        end = self.point(s, z1, SX(1.0), known[1], is_mesh=True)
+        costs, rows = [], []
+        self.costs: list[str] = []
+        self.end_labels: list[str] = []
+        limits: list[tuple[float, float]] = []
+        for goal, terms in problem.goals:
+            has = [k for k, pair in enumerate(self.integrals) if pair[0] is goal]
+            ends = Ends(start, end, totals[has[0]] if has else None)
+            value = SX(terms.value(ends))
+            if (goal.mode or terms.modes[0]) == "cost":
+                value = value**2 if terms.modes[0] != "cost" else value
+                costs.append(goal.weight * casadi.sum1(self._divided(goal, value, ends)))
+                self.costs.append(goal.name)
+                continue
+            rows.append(self._divided(goal, value, ends))
+            bounds = [range_of(each) or (0.0, 0.0) for each in goal.moco_constraint_info.bounds]
+            count = rows[-1].numel()
+            if bounds and len(bounds) != count:
+                raise problem.wrong(goal, f"it has {count} values and bounds for {len(bounds)}")
+            limits += bounds or [(0.0, 0.0)] * count
+            self.end_labels += [goal.name if count == 1 else f"{goal.name} {k}" for k in range(count)]
+        given = [s, z0, z1, totals, *known]
+        cost = casadi.densify(casadi.vertcat(*costs)) if costs else SX.zeros(0, 1)
+        wanted = casadi.densify(casadi.vertcat(*rows)) if rows else SX.zeros(0, 1)
+        both = casadi.vertcat(s, z0, z1, totals)
+        total, multipliers = casadi.sum1(cost), SX.sym("multipliers", wanted.numel())
+        factor = SX.sym("factor")
+        self.end_columns = np.concatenate([np.arange(size), layout.places[0], layout.places[last]])
+        lagrangian = factor * total + casadi.dot(multipliers, wanted)
+        self._end_value = casadi.Function("E", given, [cost, wanted])
+        self._end_slope = casadi.Function(
+            "dE", given, [casadi.densify(casadi.jacobian(total, both)), casadi.densify(casadi.jacobian(wanted, both))]
+        )
+        self._end_pattern = np.array(casadi.DM(casadi.jacobian(wanted, both).sparsity(), 1.0).full(), dtype=bool)
+        hessian = casadi.hessian(lagrangian, both)[0]
+        self._end_hessian_pattern = np.array(casadi.DM(hessian.sparsity(), 1.0).full(), dtype=bool)
+        self._end_curvature = casadi.Function("HE", [*given, factor, multipliers], [casadi.densify(hessian)])
+        self.labels += self.end_labels
+        self.times = np.append(self.times, np.full(len(self.end_labels), np.nan))
+        self.lower = np.append(self.lower, [low for low, _ in limits])
+        self.upper = np.append(self.upper, [high for _, high in limits])
+
+    def _divided(self, goal: Any, value: Any, ends: Ends) -> Any:
+        if goal.divide_by_displacement:
+            value = value / casadi.norm_2(ends.end.mass_center() - ends.start.mass_center())
+        if goal.divide_by_duration:
+            value = value / ends.duration
+        return value / self.problem.functions.mechanism.total_mass if goal.divide_by_mass else value
+
+    # ------------------------------------------------------------------------------------------ constant parts
+    def _assemble(self) -> None:
+        """A and B, with the labels of their rows; behind those of g the rows of the integrals."""
+        grid, layout, sparse = self.problem.grid, self.layout, self._sparse
+        states, controls = layout.names["states"], layout.names["controls"]
+        scheme, count = grid.scheme, len(layout.names["states"])
+        start_of = np.zeros(len(grid.places), dtype=int)
+        for sort, first in zip(self.sorts, self._offsets, strict=False):
+            start_of[sort.numbers] = first + sort.rows * np.arange(len(sort.numbers))
+        a: list[tuple[Any, Any, Any]] = []
+        b: list[tuple[Any, Any, Any]] = []
+        times: list[float] = []
+        limits: list[tuple[float, float]] = []
+        row = 0
+        interpolates = self.problem.solver.interpolate_control_mesh_interior_points
+        for interval, length in enumerate(grid.lengths):
+            points = grid.points_of(interval)
+            middle = 0.5 * (grid.places[points[0]] + grid.places[points[-1]])
+            for own, rate in zip(scheme.states, scheme.rates, strict=True):
+                rows = row + np.arange(count)
+                for k, point in enumerate(points):
+                    if own[k]:
+                        a.append((rows, layout.places_of["states"][point], np.full(count, own[k])))
+                    if rate[k]:
+                        b.append((rows, start_of[point] + np.arange(count), np.full(count, length * rate[k])))
+                self.labels += [f"{name} defect" for name in states]
+                times += [middle] * count
+                limits += [(0.0, 0.0)] * count
+                row += count
+            for line in scheme.controls if interpolates else ():
+                rows = row + np.arange(len(controls))
+                for k, point in enumerate(points):
+                    if line[k]:
+                        a.append((rows, layout.places_of["controls"][point], np.full(len(controls), line[k])))
+                self.labels += [f"{name} between nodes" for name in controls]
+                times += [middle] * len(controls)
+                limits += [(0.0, 0.0)] * len(controls)
+                row += len(controls)
+        for sort in self.sorts:
+            many = len(sort.labels)
+            for point in sort.numbers:
+                b.append((row + np.arange(many), start_of[point] + count + np.arange(many), np.ones(many)))
+                self.labels += sort.labels
+                times += [grid.places[point]] * many
+                limits += sort.limits
+                row += many
+        self._rows = row
+        for k in range(len(self.integrals)):
+            for sort in self.sorts:
+                at = start_of[sort.numbers] + sort.rows - len(self.integrals) + k
+                b.append((np.full(len(at), row + k), at, grid.weights[sort.numbers]))
+        size = row + len(self.integrals)
+
+        def matrix(parts: list[tuple[Any, Any, Any]], width: int) -> Any:
+            found: list[Any] = [np.concatenate([part[k] for part in parts]) if parts else [] for k in range(3)]
+            return sparse.csr_matrix((found[2], (found[0], found[1])), shape=(size, width))
+
+        self._a, self._b = matrix(a, len(layout.lower)), matrix(b, int(self._offsets[-1]))
+        self.times = np.array(times)
+        self.lower, self.upper = (np.array([limit[k] for limit in limits]) for k in range(2))
+
+    def _entries(self, rows: str, columns: str) -> tuple[Array, Array]:
+        """Of the derivatives of all points: which rows and columns their numbers belong to."""
+        first, second = [], []
+        for sort, start in zip(self.sorts, self._offsets, strict=False):
+            r, c = getattr(sort, rows), getattr(sort, columns)
+            for k in range(len(sort.numbers)):
+                places = np.concatenate([np.arange(self.layout.shared), sort.columns[k]])
+                first.append(start + sort.rows * k + r if rows == "jacobian_rows" else places[r])
+                second.append(places[c])
+        return np.concatenate(first), np.concatenate(second)
+
+    def _map_jacobian(self) -> None:
+        """How the numbers of the points' Jacobians make up those of A + B J."""
+        sparse, width = self._sparse, len(self.layout.lower)
+        rows, columns = self._entries("jacobian_rows", "jacobian_columns")
+        by_row = sparse.csc_matrix(
+            (np.arange(1, len(rows) + 1), (rows, np.arange(len(rows)))), shape=(self._b.shape[1], len(rows))
+        )
+        spread = self._b @ sparse.csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=by_row.shape)
+        spread = spread.tocoo()
+        own = self._a.tocoo()
+        keys = np.concatenate([spread.row * np.int64(width) + columns[spread.col], own.row * np.int64(width) + own.col])
+        unique, inverse = np.unique(keys, return_inverse=True)
+        count = len(spread.row)
+        self._jacobian_map = sparse.csr_matrix(
+            (spread.data, (inverse[:count], spread.col)), shape=(len(unique), len(rows))
+        )
+        self._jacobian_constant = np.bincount(inverse[count:], weights=own.data, minlength=len(unique))
+        self._jacobian_rows, self._jacobian_columns = unique // width, unique % width
+        self._of_g = self._jacobian_rows < self._rows
+
+    def _map_ends(self) -> None:
+        """The pattern of the rows at the ends, behind the others."""
+        width, direct = len(self.layout.lower), len(self.end_columns)
+        pattern = np.zeros((len(self.end_labels), width), dtype=bool)
+        pattern[:, self.end_columns] |= self._end_pattern[:, :direct]
+        for k in range(len(self.integrals)):
+            columns = self._jacobian_columns[self._jacobian_rows == self._rows + k]
+            for row in np.flatnonzero(self._end_pattern[:, direct + k]):
+                pattern[row, columns] = True
+        self._end_entries = np.nonzero(pattern)
+        rows = np.concatenate([self._jacobian_rows[self._of_g], self._end_entries[0] + self._rows])
+        columns = np.concatenate([self._jacobian_columns[self._of_g], self._end_entries[1]])
+        # CasADi's columns come one after the other.
+        self._jacobian_order = np.lexsort((rows, columns))
+        self.jacobian_sparsity = casadi.Sparsity.triplet(
+            len(self.labels), width, rows[self._jacobian_order].tolist(), columns[self._jacobian_order].tolist()
+        )
+
+    # ------------------------------------------------------------------------------------------------- numbers
+    def _known(self, times: Array) -> Array:
+        """What the series are made of at times (n,): (3 k + 1, n)."""
+        return np.vstack([times[None], *(np.asarray(series.values(times)) for series in self.problem.series)])
+
+    def _given(self, sort: PointFunction, w: Array) -> list[Array]:
+        places = self.problem.grid.places[sort.numbers]
+        s = w[: self.layout.shared]
+        times = w[0] + places * (w[1] - w[0])
+        return [np.repeat(s[:, None], len(places), 1), w[sort.columns].T, places[None], self._known(times)]
+
+    def _all(self, name: str, w: Array) -> Array:
+        parts = [np.array(getattr(sort, name)(*self._given(sort, w))).T.ravel() for sort in self.sorts]
+        return np.concatenate(parts)
+
+    def _rows_of(self, w: Array) -> Array:
+        return self._a @ w + self._b @ self._all("value", w)
+
+    def _end_given(self, w: Array, totals: Array) -> list[Array]:
+        known = self._known(w[:2])
+        first, last = self.layout.places[0], self.layout.places[-1]
+        return [w[: self.layout.shared], w[first], w[last], totals, known[:, 0], known[:, 1]]
+
+    def values(self, w: Array) -> tuple[Array, Array]:
+        """The parts of f, and g."""
+        rows = self._rows_of(w)
+        costs, wanted = self._end_value(*self._end_given(w, rows[self._rows :]))
+        return np.array(costs).ravel(), np.concatenate([rows[: self._rows], np.array(wanted).ravel()])
+
+    def slopes(self, w: Array) -> tuple[Array, Array]:
+        """The gradient of f, and the numbers of the Jacobian of g in the order of `jacobian_sparsity`."""
+        gradient, ends, numbers, _ = self._slopes(w)
+        entries = np.concatenate([numbers[self._of_g], ends[self._end_entries]])
+        return gradient, entries[self._jacobian_order]
+
+    def _slopes(self, w: Array) -> tuple[Array, Array, Array, Array]:
+        width, direct = len(w), len(self.end_columns)
+        numbers = self._jacobian_constant + self._jacobian_map @ self._all("slope", w)
+        integrals = np.zeros((len(self.integrals), width))
+        of = ~self._of_g
+        integrals[self._jacobian_rows[of] - self._rows, self._jacobian_columns[of]] = numbers[of]
+        totals = self._rows_of(w)[self._rows :]
+        cost, wanted = (np.array(part) for part in self._end_slope(*self._end_given(w, totals)))
+        gradient = cost.ravel()[direct:] @ integrals
+        gradient[self.end_columns] += cost.ravel()[:direct]
+        ends = wanted[:, direct:] @ integrals
+        ends[:, self.end_columns] += wanted[:, :direct]
+        return gradient, ends, numbers, integrals

@@ -1,0 +1,160 @@
+"""What came out of a study, and how it is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from osimlite.document.reader import read_document
+from osimlite.document.source import Source
+from osimlite.errors import OsimliteError
+from osimlite.optimal.ipopt import Progress, Violation, violations
+from osimlite.optimal.ipopt import solve as search
+from osimlite.optimal.problem import Problem
+from osimlite.optimal.program import Program
+from osimlite.optimal.trajectory import MocoTrajectory
+from osimlite.records import dataclass
+from osimlite.schema.moco.studies import MocoStudy
+from osimlite.simulation.files.storage import StoTable
+
+
+@dataclass(frozen=True, eq=False)
+class MocoSolution:
+    """What came out of a study.
+
+    Attributes:
+        trajectory: the motion, with everything that was varied.
+        success: whether it is a solution to the tolerances of the study.
+        status: in Ipopt's words.
+        objective: what was made small.
+        terms: the parts of it, by the names of the goals.
+        violations: the largest of what is not fulfilled, the largest first.
+        iterations: that were taken.
+        duration: of the search, s.
+    """
+
+    trajectory: MocoTrajectory
+    success: bool
+    status: str
+    objective: float
+    terms: dict[str, float]
+    violations: list[Violation]
+    iterations: int
+    duration: float
+
+    @property
+    def states(self) -> StoTable:
+        """Over time; m, rad, s, N."""
+        return self.trajectory.table("states")
+
+    @property
+    def controls(self) -> StoTable:
+        """Over time."""
+        return self.trajectory.table("controls")
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """By name."""
+        return self.trajectory.parameters
+
+    def write(self, path: str | Path) -> None:
+        """Write a file as Moco's, which OpenSim's MocoTrajectory reads.
+
+        Raises:
+            OsimliteError: it cannot be written.
+        """
+        self.trajectory.write(path)
+
+
+def solve(
+    study: str | Path | MocoStudy,
+    *,
+    guess: str | Path | MocoTrajectory | None = None,
+    folder: str | Path | None = None,
+    tell: Callable[[Progress], None] | None = None,
+) -> MocoSolution:
+    """Solve a study of Moco: the same nonlinear program as Moco's, with exact derivatives.
+
+    Args:
+        study: a file, or the study itself.
+        guess: to start from, in place of the study's; without either the middle between the bounds of each variable.
+        folder: that the files are in which a study names that is in no file; the current folder if None.
+        tell: is told of each iteration. Ctrl-C ends the search, and the best so far is what comes out.
+
+    Returns:
+        What came out; `success` says whether it is a solution, and `violations` what is not fulfilled otherwise.
+
+    Raises:
+        UnsupportedError: there is something in it that is not solved here; it says what and where.
+        OsimliteError: the study cannot be read, or is none.
+    """
+    program = Program(problem_of(study, folder))
+    return solved(program, guess, tell)
+
+
+def problem_of(study: str | Path | MocoStudy, folder: str | Path | None = None) -> Problem:
+    """The problem of a study.
+
+    Args:
+        study: a file, or the study itself.
+        folder: that its files are in, if it is in none; the current folder if None.
+
+    Raises:
+        OsimliteError: as for :func:`solve`.
+    """
+    if isinstance(study, MocoStudy):
+        return Problem(study, folder=None if folder is None else Path(folder))
+    top: Any = read_document(Source.of_file(Path(study)), of=MocoStudy).top
+    return Problem(top, Path(study))
+
+
+def solved(
+    program: Program, guess: str | Path | MocoTrajectory | None, tell: Callable[[Progress], None] | None
+) -> MocoSolution:
+    """The solution of a nonlinear program; as :func:`solve`."""
+    problem, layout = program.problem, program.layout
+    if guess is None and problem.solver.guess_file.strip():
+        guess = problem.place(problem.solver.guess_file)
+    if isinstance(guess, str | Path):
+        guess = MocoTrajectory.read(guess)
+    found = search(program, layout.guess() if guess is None else layout.taken(guess), tell)
+    costs, rows = program.values(found.w)
+    terms = dict(zip(program.costs, costs.tolist(), strict=True))
+    header = {
+        "num_iterations": str(found.iterations),
+        "objective": f"{costs.sum():.6f}",
+        **{f"objective_{name}": f"{cost:.6f}" for name, cost in terms.items()},
+        "solver_duration": f"{found.duration:.6f}",
+        "status": found.status,
+        "success": "true" if found.success else "false",
+    }
+    return MocoSolution(
+        trajectory=MocoTrajectory.of(layout, found.w, header),
+        success=found.success,
+        status=found.status,
+        objective=float(costs.sum()),
+        terms=terms,
+        violations=violations(program, found.w, rows),
+        iterations=found.iterations,
+        duration=found.duration,
+    )
+
+
+def evaluated(program: Program, trajectory: MocoTrajectory) -> tuple[dict[str, float], list[Violation]]:
+    """The parts of the objective of a trajectory, and the largest violations of what the problem demands.
+
+    Args:
+        program: of the problem.
+        trajectory: with values at the points of its grid; between its times others are on lines.
+
+    Raises:
+        OsimliteError: the trajectory has no column for one of the variables.
+    """
+    layout = program.layout
+    for name in (*layout.names["states"], *layout.names["controls"], *layout.names["multipliers"]):
+        if name not in trajectory.columns:
+            raise OsimliteError(f"the trajectory has no column '{name}'")
+    w = layout.taken(trajectory)
+    costs, rows = program.values(w)
+    return dict(zip(program.costs, costs.tolist(), strict=True)), violations(program, w, rows)

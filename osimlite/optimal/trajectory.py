@@ -1,0 +1,107 @@
+"""Motions as Moco writes them: times, states, controls, multipliers, derivatives, slacks, parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.errors import DocumentError
+from osimlite.files import make_folder, written_atomically
+from osimlite.multibody.spatial import Array
+from osimlite.optimal.layout import KINDS, Layout
+from osimlite.records import dataclass, field
+from osimlite.simulation.files.storage import StoTable, adapter_lines, read_sto
+
+COUNTS = ("states", "controls", "input_controls", "multipliers", "derivatives", "slacks", "parameters")
+"""What the header counts, in the order of the columns."""
+
+
+@dataclass(frozen=True, eq=False)
+class MocoTrajectory:
+    """What a motion consists of; a file of it is read by OpenSim's class of this name.
+
+    Attributes:
+        times: (n,), s.
+        columns: by name, each (n,); m, rad, s, N.
+        names: by ``states``, ``controls`` and so on the names of the columns.
+        parameters: by name.
+        header: what the file says besides, such as ``objective``.
+    """
+
+    times: Array
+    columns: dict[str, Array]
+    names: dict[str, tuple[str, ...]]
+    parameters: dict[str, float] = field(default_factory=dict)
+    header: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, layout: Layout, w: Array, header: dict[str, str] | None = None) -> MocoTrajectory:
+        """Of the variables of a nonlinear program.
+
+        What only points between nodes have, corrections of velocities, is spread over all times as Moco does.
+        """
+        times = w[0] + layout.problem.grid.places * (w[1] - w[0])
+        columns: dict[str, Array] = {}
+        for kind in KINDS:
+            for number, name in enumerate(layout.names[kind]):
+                places = layout.places_of[kind][:, number]
+                own = w[places[places >= 0]]
+                if len(own) < len(times):
+                    own = np.interp(times, np.linspace(times[0], times[-1], len(own)), own)
+                columns[name] = own
+        names = {kind: tuple(layout.names[kind]) for kind in KINDS}
+        parameters = dict(zip(layout.problem.parameters, w[2 : layout.shared].tolist(), strict=True))
+        return cls(times, columns, names, parameters, header or {})
+
+    @classmethod
+    def read(cls, path: str | Path) -> MocoTrajectory:
+        """Read a file of Moco, or any table of states and controls over time.
+
+        Raises:
+            OsimliteError: it cannot be read.
+            DocumentError: it has no times, or more or fewer columns than its header says.
+        """
+        table = read_sto(path)
+        if not len(table.times):
+            raise DocumentError("the file has no times", file=str(path))
+        counts = [int(table.header.get(f"num_{kind}", 0)) for kind in COUNTS]
+        if not any(counts):
+            counts[0] = len(table.columns)
+        if sum(counts) != len(table.columns):
+            message = f"the header counts {sum(counts)} columns besides the time, and there are {len(table.columns)}"
+            raise DocumentError(message, file=str(path))
+        names, first = dict[str, tuple[str, ...]](), 0
+        for kind, count in zip(COUNTS, counts, strict=True):
+            names[kind] = table.columns[first : first + count]
+            first += count
+        of = {name: table.rows[:, place] for place, name in enumerate(table.columns)}
+        parameters = {name: float(of.pop(name)[0]) for name in names.pop("parameters")}
+        return cls(table.times, of, names, parameters, table.header)
+
+    def table(self, kind: str = "") -> StoTable:
+        """The columns of one kind, or of all."""
+        kinds: Iterable[str] = [kind] if kind else COUNTS[:-1]
+        names = [name for each in kinds for name in self.names.get(each, ())]
+        rows = np.column_stack([self.columns[name] for name in names]) if names else np.zeros((len(self.times), 0))
+        header = {}
+        if not kind:
+            # OpenSim has the values of parameters in the first row.
+            first = np.full((len(self.times), len(self.parameters)), np.nan)
+            first[0] = [*self.parameters.values()]
+            rows, counted = np.hstack([rows, first]), self.names | {"parameters": tuple(self.parameters)}
+            names += self.parameters
+            said = self.header | {f"num_{each}": str(len(counted.get(each, ()))) for each in COUNTS}
+            header = {"inDegrees": "no", **dict(sorted(said.items()))}
+        return StoTable("", self.times, tuple(names), rows, header=header)
+
+    def write(self, path: str | Path) -> None:
+        """Write a file that OpenSim's MocoTrajectory reads.
+
+        Raises:
+            OsimliteError: it cannot be written.
+        """
+        make_folder(Path(path).parent)
+        with written_atomically(path) as stream:
+            stream.writelines(line.encode() for line in adapter_lines(self.table()))

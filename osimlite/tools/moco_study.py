@@ -1,0 +1,35 @@
+"""OpenSim's MocoStudy: an optimal control problem, solved."""
+
+from __future__ import annotations
+
+from osimlite.tools.job import Job
+from osimlite.tools.outcome import Outcome
+
+
+def run(job: Job, outcome: Outcome) -> None:
+    """Solve the problem, and write the solution, whether ``write_solution`` asks for it or not."""
+    # CasADi is loaded with it.
+    from osimlite.optimal.problem import Problem
+    from osimlite.optimal.program import Program
+    from osimlite.optimal.solution import solved
+
+    study = job.setup
+    program = Program(Problem(study, job.file))
+    says = outcome.progress if study.solver.verbosity > 0 else None
+    solution = solved(program, None, None if says is None else (lambda progress: says(str(progress))))
+    name = f"{study.name or 'MocoStudy'}_solution.sto"
+    outcome.new_table(job.in_results(name), solution.trajectory.table())
+    outcome.done = solution.success
+    outcome.summary |= {
+        "objective": solution.objective,
+        "terms": solution.terms,
+        "iterations": solution.iterations,
+        "status": solution.status,
+        "duration": solution.duration,
+    }
+    outcome.tell("status", f"{solution.status} after {solution.iterations} iterations in {solution.duration:.3g} s")
+    for goal, value in solution.terms.items():
+        outcome.tell(goal, f"{value:.8g}")
+    outcome.tell("objective", f"{solution.objective:.8g}")
+    for violation in solution.violations[: 1 if solution.success else 5]:
+        outcome.tell("largest violation" if solution.success else "not fulfilled", str(violation))

@@ -1,0 +1,143 @@
+"""The same nonlinear programs as Moco's: its solutions are solutions here, and ours cost no more."""
+
+from __future__ import annotations
+
+import casadi
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.moco import MocoTrajectory, evaluated, problem_of, solve
+from osimlite.optimal.hessian import Hessian
+from osimlite.optimal.program import Program
+from tests.optimal.studies import moco_found, moco_said, study, study_file
+
+STUDIES = "sliding-100", "pendulum-50", "squat-25"
+SCHEMES = "trapezoidal", "legendre-gauss-3", "legendre-gauss-radau-3"
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_moco_s_solution_is_one_here(name, tmp_path):
+    program = Program(problem_of(study_file(tmp_path, name)))
+    terms, missed = evaluated(program, MocoTrajectory.read(moco_found(tmp_path, name)))
+    said = moco_said(name)
+    assert terms == pytest.approx(said["terms"], rel=1e-9)
+    # Moco stops at 1e-4 of the rows as they are, and its files have 16 digits.
+    assert not missed or missed[0].size < max(said["ctol"], 1e-7)
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_ours_costs_no_more(name, tmp_path):
+    said = moco_said(name)
+    found = solve(study_file(tmp_path, name))
+    assert found.success
+    assert found.objective <= said["objective"] * (1.0 + 1e-4)
+    assert found.objective == pytest.approx(sum(found.terms.values()))
+    if name != "squat-25":
+        # The same steps, as the same numbers come of the same program.
+        assert (found.iterations, found.objective) == (said["iterations"], pytest.approx(said["objective"], rel=1e-7))
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_exact_hessian_finds_it_too(name, tmp_path):
+    found = solve(study(tmp_path, name, optim_hessian_approximation="exact", optim_convergence_tolerance=1e-6))
+    assert found.success
+    assert found.objective <= moco_said(name)["objective"] * (1.0 + 1e-4)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_schemes_agree(scheme, tmp_path):
+    found = solve(study(tmp_path, "sliding-100", transcription_scheme=scheme, num_mesh_intervals=40))
+    # 2 sqrt(distance / acceleration): 1 m at 25 m/s2.
+    assert found.success
+    assert found.objective == pytest.approx(0.4, abs=2e-3)
+
+
+def test_implicit_dynamics_agree(tmp_path):
+    explicit, implicit = (
+        solve(study(tmp_path, "pendulum-50", multibody_dynamics_mode=mode)) for mode in ("explicit", "implicit")
+    )
+    assert implicit.success
+    assert implicit.objective == pytest.approx(explicit.objective, rel=1e-4)
+    assert implicit.trajectory.names["derivatives"] == ("/jointset/j0/q0/accel", "/jointset/j1/q1/accel")
+
+
+@pytest.mark.parametrize(
+    ("name", "choices"),
+    [
+        ("pendulum-50", {"multibody_dynamics_mode": "implicit"}),
+        ("squat-25", {}),
+        ("pendulum-50", {"transcription_scheme": "legendre-gauss-3"}),
+    ],
+)
+def test_derivatives(name, choices, tmp_path):
+    program = Program(problem_of(study(tmp_path, name, num_mesh_intervals=4, **choices)))
+    rng, width = np.random.default_rng(1), len(program.layout.lower)
+    w = program.layout.guess() + 0.1 * rng.normal(size=width)
+    way, step, push = rng.normal(size=width), 1e-6, rng.normal(size=len(program.labels))
+
+    def slope(at):
+        gradient, numbers = program.slopes(at)
+        return gradient, np.array(casadi.DM(program.jacobian_sparsity, numbers.tolist()).full())
+
+    def along(function):
+        return (function(w + step * way) - function(w - step * way)) / (2.0 * step)
+
+    gradient, jacobian = slope(w)
+    assert gradient @ way == pytest.approx(along(lambda at: program.values(at)[0].sum()), rel=1e-6)
+    rows = along(lambda at: program.values(at)[1])
+    assert np.abs(jacobian @ way - rows).max() <= 1e-7 * max(1.0, np.abs(rows).max())
+    hessian = Hessian(program)
+    half = np.array(casadi.DM(hessian.sparsity, hessian.numbers(w, 0.7, push).tolist()).full())
+    change = along(lambda at: 0.7 * slope(at)[0] + slope(at)[1].T @ push)
+    assert np.abs((half + np.triu(half, 1).T) @ way - change).max() <= 1e-6 * max(1.0, np.abs(change).max())
+
+
+def test_the_file_comes_back_and_starts_another_search(tmp_path):
+    found = solve(study_file(tmp_path, "pendulum-50"))
+    found.write(tmp_path / "solution.sto")
+    again = MocoTrajectory.read(tmp_path / "solution.sto")
+    assert again.header["status"] == "Solve_Succeeded"
+    for name, column in found.trajectory.columns.items():
+        np.testing.assert_allclose(again.columns[name], column, rtol=1e-14, atol=1e-14)
+    warm = solve(study_file(tmp_path, "pendulum-50"), guess=tmp_path / "solution.sto")
+    assert warm.iterations < found.iterations
+    assert warm.objective == pytest.approx(found.objective, rel=1e-4)
+
+
+def test_progress_names_what_is_violated_and_when(tmp_path):
+    told = []
+    found = solve(study(tmp_path, "pendulum-50", optim_max_iterations=6), tell=told.append)
+    assert [each.iteration for each in told] == list(range(7))
+    assert not found.success
+    assert found.status == "Maximum_Iterations_Exceeded"
+    assert "defect at" in str(told[1])
+    assert found.violations[0].size >= found.violations[-1].size > 0.0
+
+
+def test_parameters_are_found(tmp_path):
+    """The lightest slider is the first to arrive: 2 sqrt(1 m / (50 N / mass))."""
+    given = study(tmp_path, "sliding-100", num_mesh_intervals=20)
+    bounds = osimlite.MocoBounds(bounds=(1.0, 4.0))
+    given.problem.phases.parameters.append(
+        osimlite.MocoParameter(name="mass", moco_bounds=bounds, component_paths=("/body",), property_name="mass")
+    )
+    found = solve(given)
+    assert found.success
+    assert found.parameters == {"mass": pytest.approx(1.0, abs=1e-4)}
+    assert found.objective == pytest.approx(2.0 * np.sqrt(1.0 / 50.0), rel=2e-3)
+    found.write(tmp_path / "solution.sto")
+    assert MocoTrajectory.read(tmp_path / "solution.sto").parameters == found.parameters
+
+
+def test_what_is_not_solved_is_refused_by_name_and_place(tmp_path):
+    path = study_file(tmp_path, "pendulum-50")
+    text = path.read_text()
+    path.write_text(text.replace("MocoFinalTimeGoal", "MocoStepTimeAsymmetryGoal"))
+    line = next(k for k, words in enumerate(path.read_text().splitlines(), 1) if "<MocoStepTimeAsymmetryGoal" in words)
+    with pytest.raises(osimlite.OsimliteError, match="MocoStepTimeAsymmetryGoal 'time': goals of this class") as raised:
+        solve(path)
+    assert (raised.value.file, raised.value.line) == (str(path), line)
+    path.write_text(text.replace('name="/tau0"', 'name="/tau2"'))
+    with pytest.raises(osimlite.OsimliteError, match="no control '/tau2'; did you mean '/tau"):
+        solve(path)
