@@ -56,6 +56,7 @@ PAGES = {
     "osimlite.multibody": "docs/constraints.md",
     "osimlite.multibody.assembly": "docs/constraints.md#the-start",
     "osimlite.multibody.mechanism": "docs/from-opensim.md#kinematics-and-dynamics",
+    "osimlite.optimal": "docs/optimal-control.md",
     "osimlite.project": "docs/lint-in-ci.md#settings",
     "osimlite.schema": "docs/from-opensim.md#making-components",
     "osimlite.schema.tree": "docs/from-opensim.md#finding-components",

@@ -14,8 +14,8 @@ import numpy as np
 
 from osimlite._load import module_name
 from osimlite.backends.functions import casadi as functions_of
-from osimlite.document.kept import read_anew
 from osimlite.errors import DocumentError, UnsupportedError
+from osimlite.modifying.processing import processed
 from osimlite.multibody.spatial import Array
 from osimlite.optimal.bounds import FREE, Range, control_bounds, range_of, state_bounds
 from osimlite.optimal.dynamics import Dynamics
@@ -159,13 +159,9 @@ class Problem:
     # ------------------------------------------------------------------------------------------------- parts
     def _model(self) -> Model:
         processor = self.phase.model
-        for operator in processor.operators:
-            raise self.refused(operator, "operators on models are not applied here yet; print the processed model")
-        if processor.filepath.strip():
-            return read_anew(self.place(processor.filepath), Model)
-        if processor.model is None:
+        if not processor.filepath.strip() and processor.model is None:
             raise self.wrong(processor, "it has no model and names none")
-        return processor.model
+        return processed(processor, self.folder)
 
     def _refuse_parts(self) -> None:
         for part in self.components.values():
