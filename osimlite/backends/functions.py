@@ -10,20 +10,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from osimlite.errors import SettingError
+from osimlite.errors import SettingError, UnsupportedError
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.records import replace
 from osimlite.schema.model import Model, expect_model
 from osimlite.simulation.constrained import kept_state
-from osimlite.simulation.elements import Forces, force_elements
+from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.simulation.kernels.pack import Packed, pack
 from osimlite.simulation.states import StateLayout, in_model_order
 
 if TYPE_CHECKING:
+    from osimlite.backends.given_paths import SearchedPaths
     from osimlite.backends.traced import Evaluated, Traced
 
 FUNCTIONS = "dynamics", "residual", "constraints", "outputs", "paths"
@@ -110,19 +111,31 @@ class CasadiModel:
             "u": library.SX.sym("u", len(self.controls)),
             "p": library.SX.sym("p", len(self.parameters)),
             "multipliers": library.SX.sym("multipliers", self.constraints_kept),
+            "paths": library.SX.sym("paths", self._searched.size),
         }
+        self._searched.name(self._entries("paths"))
+        self._measured = self._searched.function() if self._searched.size else None
         # What has no formula is refused at once.
         self._traced  # noqa: B018
 
     def _take(self, model: Model) -> None:
         self.mechanism: Mechanism = build_mechanism(model)
-        self.forces = self._forces_of(model, self.mechanism)
+        self._searched = self._searched_of(model, self.mechanism)
+        self.forces = self._searched.forces
         self._packed: Packed = pack(self.mechanism, self.forces, apart=self._apart)
         self._state = StateLayout(self.mechanism, self._packed.order, self.forces.elements)
 
-    def _forces_of(self, model: Model, mechanism: Mechanism) -> Forces:
+    def _searched_of(self, model: Model, mechanism: Mechanism) -> SearchedPaths:
+        """The forces, and those of their paths whose way is searched for."""
+        from osimlite.backends.given_paths import SearchedPaths
+
         forces = force_elements(model, mechanism, folder=self._folder)
-        return replace(forces, elements=tuple(e for e in forces.elements if not isinstance(e, DeclaredProbe)))
+        forces = replace(forces, elements=tuple(e for e in forces.elements if not isinstance(e, DeclaredProbe)))
+        infos = mechanism.coordinates
+        moving = [k for k, info in enumerate(infos) if not info.locked]
+        paths = in_model_order(model, [f"{infos[k].path}/value" for k in moving])
+        places = {f"{infos[k].path}/value": k for k in moving}
+        return SearchedPaths(mechanism, forces, [places[path] for path in paths])
 
     def _symbolic(self, model: Model) -> Any:
         if not self.parameters:
@@ -133,10 +146,15 @@ class CasadiModel:
 
         def numbers_of(changed: Model) -> Array:
             mechanism = build_mechanism(changed)
-            packed = pack(mechanism, self._forces_of(changed, mechanism), apart=self._apart)
+            searched = self._searched_of(changed, mechanism)
+            packed = pack(mechanism, searched.forces, apart=self._apart)
             if not np.array_equal(packed.structure, structure):
                 return np.zeros(0)
-            return np.concatenate((packed.numbers, _station_numbers(mechanism, packed)))
+            # Ways that are searched for may not change: lengths are no lines over anything.
+            ways = (
+                [searched.measured(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)] if searched.size else []
+            )
+            return np.concatenate((packed.numbers, _station_numbers(mechanism, packed), *ways))
 
         return Parameters(model.copy_deep(), self.parameters, numbers_of)
 
@@ -180,7 +198,17 @@ class CasadiModel:
 
     def _function(self, name: str, given: Sequence[str], results: dict[str, Any]) -> Any:
         symbols = [self._symbols[item] for item in given]
-        return self._library.Function(name, symbols, [*results.values()], [*given], [*results])
+        if self._measured is None or "x" not in given:
+            return self._library.Function(name, symbols, [*results.values()], [*given], [*results])
+        inner = self._library.Function(f"{name}_of_paths", [*symbols, self._symbols["paths"]], [*results.values()])
+        outer = self._arguments(given)
+        found = inner(*outer, self._measured(outer[given.index("x")][: len(self.coordinates)]))
+        return self._library.Function(name, outer, [*found] if len(results) > 1 else [found], [*given], [*results])
+
+    def _arguments(self, given: Sequence[str]) -> list[Any]:
+        """Symbols for the arguments of a function: of expressions, if one of its parts is none."""
+        kind = self._library.SX if self._measured is None else self._library.MX
+        return [kind.sym(name, self._symbols[name].numel()) for name in given]
 
     # --------------------------------------------------------------------------------------------- functions
     @cached_property
@@ -193,9 +221,10 @@ class CasadiModel:
     def linear(self) -> Any:
         """``linear(t, x, u, p) -> xdot, A, B``: the same with its exact derivatives by the state and the controls."""
         given = "t", "x", "u", "p"
-        xdot = self.dynamics(*(self._symbols[name] for name in given))
-        slopes = {name: self._library.jacobian(xdot, self._symbols[key]) for name, key in (("A", "x"), ("B", "u"))}
-        return self._function("linear", given, {"xdot": xdot, **slopes})
+        symbols = self._arguments(given)
+        xdot = self.dynamics(*symbols)
+        slopes = [self._library.jacobian(xdot, symbols[given.index(name)]) for name in ("x", "u")]
+        return self._library.Function("linear", symbols, [xdot, *slopes], [*given], ["xdot", "A", "B"])
 
     @cached_property
     def residual(self) -> Any:
@@ -328,10 +357,16 @@ class CasadiModel:
 
         Raises:
             SettingError: there is no such function.
+            UnsupportedError: the model has paths around surfaces.
         """
         names, folder = [*functions], Path(folder)
         if unknown := [name for name in names if name not in FUNCTIONS]:
             raise SettingError(f"there is no function '{unknown[0]}'; there are {', '.join(FUNCTIONS)}")
+        if self._measured is not None:
+            raise UnsupportedError(
+                "paths around surfaces are searched for by osimlite, which files cannot do; put polynomials in their "
+                "places first (osimlite modify --replace paths=polynomial)"
+            )
         folder.mkdir(parents=True, exist_ok=True)
         written = []
         generator = self._library.CodeGenerator("model.c", {"with_header": True})

@@ -66,7 +66,7 @@ class Parameters:
         columns = np.zeros((len(base), len(given)))
         for k, name in enumerate(names):
             one, two = (self._changed(number, [k]) for number in range(2))
-            columns[:, k] = (numbers_at(one, f"'{name}'") - base) / (one[k] - given[k])
+            columns[:, k] = _apart(numbers_at(one, f"'{name}'"), base) / (one[k] - given[k])
             _require(numbers_at(two, f"'{name}'"), base, columns[:, [k]], (two - self.values)[[k]], f"'{name}'")
         if len(given) > 1:
             every = " and ".join(f"'{name}'" for name in names) if len(names) < 4 else "these parameters"
@@ -105,11 +105,17 @@ def _value(name: str, setters: Sequence[Setter]) -> float:
     return values.pop()
 
 
+def _apart(found: Array, base: Array) -> Array:
+    """How much numbers have changed; one without end has not."""
+    same = found == base
+    return np.where(same, 0.0, found - np.where(same, 0.0, base))
+
+
 def _require(found: Array, base: Array, columns: Array, change: Array, what: str) -> None:
     """Refuse what does not lie on the lines."""
     parts = columns * change
     size = np.abs(base) + np.abs(parts).sum(axis=1)
-    if np.any(np.abs(found - base - parts.sum(axis=1)) > SAME * size):
+    if not np.all(np.abs(_apart(found, base) - parts.sum(axis=1)) <= SAME * size):
         raise UnsupportedError(
             f"{what} cannot stay a symbol: what the equations are given is no linear function of it; "
             "change it in the model and make the functions anew"

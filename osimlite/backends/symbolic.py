@@ -9,8 +9,11 @@ from types import FunctionType
 from typing import Any
 
 from osimlite.backends import symbols, ways
+from osimlite.backends.curves import curve_value_on_symbols, damped_velocity_on_symbols
 from osimlite.backends.reader import Function, Kernel, name_of, stored
 from osimlite.backends.symbols import COUNTERPARTS, UNSET, NoFormula, Vector
+from osimlite.forces.bezier import curve_value
+from osimlite.forces.millard2012_equilibrium import damped_velocity
 from osimlite.simulation.kernels import pointers
 from osimlite.simulation.kernels.trigonometry import sine_cosine
 
@@ -47,7 +50,13 @@ def _call(address: int, *given: Any) -> int:
     return result
 
 
-_known: dict[Any, Any] = {pointers.at: _at, pointers.call: _call, sine_cosine: symbols.sine_cosine}
+_known: dict[Any, Any] = {
+    pointers.at: _at,
+    pointers.call: _call,
+    sine_cosine: symbols.sine_cosine,
+    curve_value: curve_value_on_symbols,
+    damped_velocity: damped_velocity_on_symbols,
+}
 """The counterparts of functions that have been asked for."""
 
 

@@ -15,7 +15,7 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.linking import PYTHON, Program
 from osimlite.simulation.kernels.constrained_dynamics import bind
 from osimlite.simulation.kernels.dynamics import evaluate, inverse
-from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, STAGE, WORK
+from osimlite.simulation.kernels.layout import CONSTRAINED, ITEM, MODEL, STAGE, WORK
 from osimlite.simulation.kernels.pack import Packed
 from osimlite.simulation.kernels.pointers import address
 
@@ -64,11 +64,17 @@ class Traced:
     ) -> None:
         self._packed, self._elements = packed, forces.elements
         self.numbers, self._t, self._y, self._controls = numbers, t, y, controls
+        given: dict[int, int] = {}
         for place, kernel in packed.kernels.items():
+            if not isinstance(kernel, str) and hasattr(kernel, "takes_symbols"):
+                given[place] = address(kernel)  # type: ignore[arg-type]
+                continue
             if place in packed.owners and (not isinstance(kernel, str) or kernel in REFUSED):
                 reason = REFUSED[kernel] if isinstance(kernel, str) else "it is computed in Python"
                 raise UnsupportedError(f"'{self._path(place)}' has no formula for CasADi: {reason}")
         self.structure: list[int] = Program(packed, PYTHON).ints.tolist()
+        for place, law_address in given.items():
+            self.structure[place + ITEM.LAW] = law_address
         # The controls are given, whatever the controllers of the model say.
         self.structure[MODEL.CONTROLS] = 0
         if self.structure[MODEL.CONSTRAINED]:
