@@ -209,8 +209,13 @@ def test_a_number_that_is_no_parameter_is_refused():
 
 
 def test_what_has_no_formula_is_refused_by_name():
-    with pytest.raises(osimlite.OsimliteError, match=r"'/forceset/glut_max_r' has no formula .* FunctionBasedPath"):
-        osimlite.casadi(model_named("jumper"))
+    model = osimlite.read_text(osimlite.to_text(model_named("furthest-walker")))
+    foot = next(item for item in model.contact_geometry_set.objects if item.name == "RFootContact")
+    egg = osimlite.ContactEllipsoid(name=foot.name, radii=(0.04, 0.05, 0.06))
+    egg.socket_frame, egg.location = foot.socket_frame, foot.location
+    model.contact_geometry_set.objects[model.contact_geometry_set.objects.index(foot)] = egg
+    with pytest.raises(osimlite.OsimliteError, match=r"'/forceset/RFootForce' has no formula .* take spheres"):
+        osimlite.casadi(model)
 
 
 def test_functions_are_written(tmp_path):
