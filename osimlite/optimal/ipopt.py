@@ -149,6 +149,8 @@ def _options(program: Program) -> dict[str, Any]:
     """As Moco sets them."""
     settings, options = program.problem.solver, dict[str, Any]()
     options["hessian_approximation"] = settings.optim_hessian_approximation
+    # METIS orders what hangs together over time in half of what MUMPS takes by its own choice.
+    options["mumps_pivot_order"] = 5
     if settings.optim_max_iterations != -1:
         options["max_iter"] = settings.optim_max_iterations
     if (tolerance := settings.optim_convergence_tolerance) != -1.0:

@@ -6,12 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from osimlite.multibody.smoothing_spline import SampledCurves
 from osimlite.multibody.spatial import Array
 from osimlite.optimal.bounds import Bounds, middle, range_of
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
 
+FEWEST = 6
+"""Times that splines of fifth degree need."""
 KINDS = "states", "controls", "multipliers", "derivatives", "slacks"
 """What a point may have variables of, in this order."""
 
@@ -74,7 +77,7 @@ class Layout:
         return np.array([middle(low, high) for low, high in zip(self.lower, self.upper, strict=True)])
 
     def taken(self, trajectory: Any) -> Array:
-        """A guess from a trajectory, linear between its times; what it has not is in the middle of its bounds."""
+        """A guess from a trajectory, by splines between its times; what it has not is in the middle of its bounds."""
         result, times = self.guess(), trajectory.times
         result[:2] = times[0], times[-1]
         at = times[0] + self.problem.grid.places * (times[-1] - times[0])
@@ -83,8 +86,7 @@ class Layout:
                 column = trajectory.columns.get(name)
                 if column is not None:
                     places = self.places_of[kind][:, number]
-                    known = np.isfinite(column)
-                    result[places[places >= 0]] = np.interp(at, times[known], column[known])[places >= 0]
+                    result[places[places >= 0]] = _resampled(times, column, at)[places >= 0]
         for number, name in enumerate(self.problem.parameters):
             if name in trajectory.parameters:
                 result[2 + number] = trajectory.parameters[name]
@@ -99,3 +101,13 @@ class Layout:
             if len(found):
                 return self.names[kind][found[0][1]]
         return ""
+
+
+def _resampled(times: Array, column: Array, at: Array) -> Array:
+    """A column at other times: by a natural spline of fifth degree as Moco does, of few times on lines."""
+    if len(times) == len(at) and np.allclose(times, at, rtol=0.0, atol=1e-12):
+        return column
+    known = np.isfinite(column)
+    if known.sum() < FEWEST:
+        return np.interp(at, times[known], column[known])
+    return SampledCurves(times[known], column[known][:, None]).derivatives(at, (0,))[0][:, 0]

@@ -28,7 +28,7 @@ from osimlite.schema.moco.goals import MocoGoal
 from osimlite.schema.moco.parts import MocoWeightSet
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoStudy
 from osimlite.schema.model import Model
-from osimlite.simulation.files.storage import beside
+from osimlite.simulation.files.storage import StoTable, beside
 from osimlite.text import did_you_mean
 
 NO_RATES = "BallJoint", "EllipsoidJoint", "FreeJoint", "ScapulothoracicJoint"
@@ -42,6 +42,8 @@ class Problem:
         study: as it was read or made.
         file: it stands in, for messages and for the files that it names.
         folder: that those files are in, if the study is in none; the current folder if None.
+
+        tables: by names of goals, in the place of those that their references name.
 
     Attributes:
         study: as given; `phase` and `solver` are its parts.
@@ -60,7 +62,14 @@ class Problem:
         DocumentError: the study says something that cannot be, such as a state that is none.
     """
 
-    def __init__(self, study: MocoStudy, file: str | Path | None = None, folder: Path | None = None) -> None:
+    def __init__(
+        self,
+        study: MocoStudy,
+        file: str | Path | None = None,
+        folder: Path | None = None,
+        tables: Mapping[str, StoTable] | None = None,
+    ) -> None:
+        self.tables = tables or {}
         self.study, self.file = study, None if file is None else Path(file)
         self.folder = self.file.parent if self.file is not None else folder or Path(".")
         self.phase = study.problem.phases
@@ -87,6 +96,7 @@ class Problem:
         self.grid = Grid.of(scheme_named(self.solver.transcription_scheme), self._mesh())
         self.dynamics = Dynamics(self)
         self._refuse_implicit_tendons()
+        self._refuse_settings()
         self.goals: list[tuple[MocoGoal, Terms]] = [
             (goal, self._terms(goal)) for goal in self.phase.goals if goal.enabled
         ]
@@ -184,6 +194,19 @@ class Problem:
                     f"the tendon of {part.path} is of the implicit kind; take tendon_compliance_dynamics_mode explicit"
                 )
                 raise self.refused(self.phase, message)
+
+    def _refuse_settings(self) -> None:
+        for name in (
+            "minimize_lagrange_multipliers",
+            "minimize_implicit_multibody_accelerations",
+            "minimize_implicit_auxiliary_derivatives",
+            "scale_variables_using_bounds",
+        ):
+            # What there is nothing of costs nothing: tools of Moco ask for it in any case.
+            if getattr(self.solver, name) and name != "minimize_implicit_auxiliary_derivatives":
+                raise self.refused(self.solver, f"{name} is not done here yet")
+        if self.solver.optim_solver != "ipopt":
+            raise self.refused(self.solver, f"of optimizers only ipopt is known, not {self.solver.optim_solver}")
 
     def _parameter_paths(self, parameter: Any) -> list[str]:
         element = parameter.property_element

@@ -79,6 +79,8 @@ class Program:
 
     def __init__(self, problem: Problem) -> None:
         self.problem, self.layout = problem, Layout(problem)
+        self._found: dict[bytes, Array] = {}
+        self._last: tuple[Array, Array] | None = None
         self.labels: list[str] = []
         self.times: Array = np.zeros(0)
         self.lower: Array = np.zeros(0)
@@ -289,7 +291,13 @@ class Program:
     # ------------------------------------------------------------------------------------------------- numbers
     def _known(self, times: Array) -> Array:
         """What the series are made of at times (n,): (3 k + 1, n)."""
-        return np.vstack([times[None], *(np.asarray(series.values(times)) for series in self.problem.series)])
+        key = times.tobytes()
+        if key not in self._found:
+            if len(self._found) >= 8:
+                self._found.clear()
+            values = (np.asarray(series.values(times)) for series in self.problem.series)
+            self._found[key] = np.vstack([times[None], *values])
+        return self._found[key]
 
     def _given(self, sort: PointFunction, w: Array) -> list[Array]:
         places = self.problem.grid.places[sort.numbers]
@@ -302,7 +310,10 @@ class Program:
         return np.concatenate(parts)
 
     def _rows_of(self, w: Array) -> Array:
-        return self._a @ w + self._b @ self._all("value", w)
+        """G and the integrals; Ipopt asks for all that belongs to one w, one after the other."""
+        if self._last is None or not np.array_equal(self._last[0], w):
+            self._last = w.copy(), self._a @ w + self._b @ self._all("value", w)
+        return self._last[1]
 
     def _end_given(self, w: Array, totals: Array) -> list[Array]:
         known = self._known(w[:2])

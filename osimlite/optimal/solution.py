@@ -146,7 +146,7 @@ def evaluated(program: Program, trajectory: MocoTrajectory) -> tuple[dict[str, f
 
     Args:
         program: of the problem.
-        trajectory: with values at the points of its grid; between its times others are on lines.
+        trajectory: with values at the points of its grid; between its times are splines.
 
     Raises:
         OsimliteError: the trajectory has no column for one of the variables.

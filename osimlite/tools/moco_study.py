@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
+
+if TYPE_CHECKING:
+    from osimlite.optimal.solution import MocoSolution
 
 
 def run(job: Job, outcome: Outcome) -> None:
@@ -14,11 +19,15 @@ def run(job: Job, outcome: Outcome) -> None:
     from osimlite.optimal.solution import solved
 
     study = job.setup
-    program = Program(Problem(study, job.file))
     says = outcome.progress if study.solver.verbosity > 0 else None
-    solution = solved(program, None, None if says is None else (lambda progress: says(str(progress))))
-    name = f"{study.name or 'MocoStudy'}_solution.sto"
-    outcome.new_table(job.in_results(name), solution.trajectory.table())
+    told = None if says is None else (lambda progress: says(str(progress)))
+    solution = solved(Program(Problem(study, job.file)), None, told)
+    outcome.new_table(job.in_results(f"{study.name or 'MocoStudy'}_solution.sto"), solution.trajectory.table())
+    report(solution, outcome)
+
+
+def report(solution: MocoSolution, outcome: Outcome) -> None:
+    """Say what came out of a search."""
     outcome.done = solution.success
     outcome.summary |= {
         "objective": solution.objective,

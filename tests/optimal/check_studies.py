@@ -141,3 +141,9 @@ def test_what_is_not_solved_is_refused_by_name_and_place(tmp_path):
     path.write_text(text.replace('name="/tau0"', 'name="/tau2"'))
     with pytest.raises(osimlite.OsimliteError, match="no control '/tau2'; did you mean '/tau"):
         solve(path)
+
+
+@pytest.mark.parametrize("setting", ["minimize_lagrange_multipliers", "scale_variables_using_bounds"])
+def test_settings_without_effect_are_refused(setting, tmp_path):
+    with pytest.raises(osimlite.OsimliteError, match=f"{setting} is not done here yet"):
+        problem_of(study(tmp_path, "sliding-100", **{setting: True}))

@@ -1,0 +1,129 @@
+"""Tables that studies name, as their processors make them, and splines through their columns."""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from osimlite.errors import DocumentError
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.smoothing_spline import SampledCurves
+from osimlite.multibody.spatial import Array
+from osimlite.optimal.layout import FEWEST
+from osimlite.optimal.point import Series
+from osimlite.records import replace
+from osimlite.schema.base import Object
+from osimlite.schema.tools.processors import TableProcessor, TabOpLowPassFilter, TabOpUseAbsoluteStateNames
+from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.simulation.lowpass import lowpassed
+
+if TYPE_CHECKING:
+    from osimlite.optimal.problem import Problem
+
+
+def table_of(problem: Problem, part: Object, processor: TableProcessor) -> StoTable:
+    """The table of a processor, in rad.
+
+    Args:
+        problem: that it is for.
+        part: of the study that has the processor, for messages.
+        processor: that names the file.
+
+    Raises:
+        UnsupportedError: one of its operators is not applied here.
+        OsimliteError: the file cannot be read.
+    """
+    given = problem.tables.get(part.name)
+    return given if given is not None else processed_table(problem, part, processor)
+
+
+def processed_table(problem: Problem, part: Object, processor: TableProcessor) -> StoTable:
+    """The table as its processor makes it; errors as of :func:`table_of`."""
+    if not processor.filepath.strip():
+        raise problem.wrong(part, "it names no table")
+    table = read_sto(problem.place(processor.filepath))
+    for operator in processor.operators:
+        if isinstance(operator, TabOpLowPassFilter):
+            table = _filtered(table, operator)
+        elif isinstance(operator, TabOpUseAbsoluteStateNames):
+            table = replace(table, columns=tuple(_absolute(name, problem.functions.states) for name in table.columns))
+        else:
+            raise problem.refused(operator, "this operator on tables is not applied here")
+    return _in_radians(table, problem.functions.mechanism)
+
+
+def _filtered(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
+    if operator.cutoff_frequency < 0.0:
+        return table
+    times, rows = table.times, table.rows
+    step = float(np.diff(times).min())
+    if float(times[-1] - times[0]) / (len(times) - 1) - step > np.finfo(float).eps:
+        # Made even before it is continued at both ends: OpenSim's tools for storage files do the one after the other.
+        even = times[0] + step * np.arange(int((times[-1] - times[0]) / step + 1e-9) + 1)
+        (rows,) = SampledCurves(times, rows).derivatives(even, (0,))
+        times = even
+    times, rows = lowpassed(times, rows, operator.cutoff_frequency)
+    if operator.trim_to_original_time_range:
+        slack = 1e-6 * (times[1] - times[0])
+        own = (times >= table.times[0] - slack) & (times <= table.times[-1] + slack)
+        times, rows = times[own], rows[own]
+    return replace(table, times=times, rows=rows)
+
+
+def _absolute(label: str, states: tuple[str, ...]) -> str:
+    """The path of the state that an old label means; the label itself if it means none."""
+    ending = f"{label[:-2]}/speed" if label.endswith("_u") else label.replace(".", "/")
+    for end in (label, ending, f"{ending}/value", re.sub(r"^.*/(?=[^/]+/[^/]+$)", "", label)):
+        found = [state for state in states if state == end or state.endswith(f"/{end}")]
+        if len(found) == 1:
+            return found[0]
+    return label
+
+
+def _in_radians(table: StoTable, mechanism: Mechanism) -> StoTable:
+    if not table.in_degrees:
+        return table
+    angles = {info.path for info in mechanism.coordinates if info.unit == "rad"}
+    turns = [label in angles or label.rpartition("/")[0] in angles for label in table.columns]
+    return replace(table, rows=table.rows * np.where(turns, np.pi / 180.0, 1.0), in_degrees=False)
+
+
+def splines(problem: Problem, table: StoTable, columns: list[str]) -> list[Series]:
+    """Splines of fifth degree through columns of a table, as OpenSim's GCVSplineSet.
+
+    Raises:
+        DocumentError: a column is not there, has gaps, or is too short.
+    """
+    if len(table.times) < FEWEST:
+        message = f"it has {len(table.times)} times; splines of fifth degree take {FEWEST} at least"
+        raise DocumentError(message, file=table.file)
+    for name in columns:
+        if name not in table.columns:
+            raise DocumentError(f"there is no column '{name}'", file=table.file)
+        if not np.isfinite(table[name]).all():
+            raise DocumentError(f"column '{name}' has gaps; fill them", file=table.file)
+    curves = Curves(table.times, np.column_stack([table.times, *(table[name] for name in columns)])[:, 1:])
+    return [problem.given(partial(_column, curves, k)) for k in range(len(columns))]
+
+
+def _column(curves: Curves, number: int, times: Array) -> Array:
+    found: Array = curves.at(times)[:, :, number]
+    return found
+
+
+class Curves:
+    """Splines through columns, asked for all at once."""
+
+    def __init__(self, times: Array, rows: Array) -> None:
+        self._curves = SampledCurves(times, rows)
+        self._times: Array | None = None
+        self._values = np.zeros(0)
+
+    def at(self, times: Array) -> Array:
+        """Value and two derivatives (3, n, m) at n times of m columns."""
+        if self._times is None or not np.array_equal(self._times, times):
+            self._times, self._values = times.copy(), np.array(self._curves.derivatives(times, (0, 1, 2)))
+        return self._values

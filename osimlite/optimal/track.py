@@ -1,0 +1,163 @@
+"""MocoTrack: the study of a motion that follows measured states."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.modifying.processing import processed
+from osimlite.multibody.smoothing_spline import derivatives_of_samples
+from osimlite.optimal.ipopt import Progress
+from osimlite.optimal.problem import Problem
+from osimlite.optimal.program import Program
+from osimlite.optimal.solution import MocoSolution, solved
+from osimlite.optimal.tables import processed_table
+from osimlite.optimal.trajectory import MocoTrajectory
+from osimlite.records import replace
+from osimlite.schema.moco.goals import MocoControlGoal
+from osimlite.schema.moco.parts import MocoFinalBounds, MocoInitialBounds, MocoWeight, MocoWeightSet
+from osimlite.schema.moco.studies import MocoCasADiSolver, MocoPhase, MocoProblem, MocoStudy, MocoTrack
+from osimlite.schema.moco.tracking import MocoStateTrackingGoal
+from osimlite.schema.tools.processors import ModelProcessor
+from osimlite.simulation.files.storage import StoTable
+
+HALF_ORDER = 3
+"""Of the splines whose derivatives are followed; they are of fifth degree."""
+
+
+def problem_of_track(
+    tool: MocoTrack,
+    file: Path | None = None,
+    folder: Path | None = None,
+    more: Callable[[MocoStudy], None] | None = None,
+) -> tuple[Problem, MocoTrajectory | None]:
+    """The problem that the tool makes, and what it starts from if that is not the middle between the bounds.
+
+    Args:
+        tool: its settings.
+        file: they stand in.
+        folder: that their files are in, if they are in none.
+        more: changes the study before it becomes a problem: goals, bounds, settings of the solver.
+
+    Raises:
+        UnsupportedError: markers are to be followed, or something else that is not done here.
+        OsimliteError: the settings or their files are not as they have to be.
+    """
+    place = file.parent if file is not None else folder or Path(".")
+    solver = MocoCasADiSolver(
+        name="solver",
+        optim_convergence_tolerance=1e-2,
+        optim_constraint_tolerance=1e-2,
+        optim_finite_difference_scheme="forward",
+    )
+    phase = MocoPhase(name="phases", model=ModelProcessor(name="model", model=processed(tool.model, place)))
+    study = MocoStudy(name=tool.name, problem=MocoProblem(name="problem", phases=phase), solver=solver)
+    # The names of states and where errors are told of are those of a problem that has no goals yet.
+    bare = Problem(study, file, place)
+    if tool.markers_reference.filepath.strip():
+        raise bare.refused(tool.markers_reference, "markers are not followed here yet")
+    if not tool.states_reference.filepath.strip():
+        raise bare.wrong(tool, "it has nothing to follow; give it a states_reference")
+    table = processed_table(bare, tool.states_reference, tool.states_reference)
+    if tool.track_reference_position_derivatives:
+        table = _with_speeds(table)
+    goal = MocoStateTrackingGoal(
+        name="state_tracking",
+        weight=tool.states_global_tracking_weight,
+        allow_unused_references=tool.allow_unused_references,
+        scale_weights_with_range=tool.scale_state_weights_with_range,
+        state_weights=MocoWeightSet(name="state_weights", objects=_weights(bare, tool, table)),
+    )
+    phase.goals.append(goal)
+    if tool.minimize_control_effort:
+        weights = [weight.copy_deep() for weight in tool.controls_weight_set.objects]
+        phase.goals.append(
+            MocoControlGoal(
+                name="control_effort",
+                weight=tool.control_effort_weight,
+                control_weights=MocoWeightSet(name="control_weights", objects=weights),
+            )
+        )
+    first, last = _times(bare, tool, table)
+    solver.num_mesh_intervals = math.ceil((last - first) / tool.mesh_interval)
+    if tool.clip_time_range:
+        first, last = first + 1e-3, last - 1e-3
+    phase.time_initial_bounds = MocoInitialBounds(name="time_initial_bounds", bounds=(first,))
+    phase.time_final_bounds = MocoFinalBounds(name="time_final_bounds", bounds=(last,))
+    if more is not None:
+        more(study)
+    guess = None
+    if tool.guess_file.strip():
+        guess = MocoTrajectory.read(bare.place(tool.guess_file))
+    problem = Problem(study, file, place, {"state_tracking": table})
+    if tool.apply_tracked_states_to_guess:
+        # Moco takes the rows one after the other from the first time to the last, whenever they were measured.
+        times = np.linspace(first, last, len(table.times))
+        states = {name: table[name] for name in table.columns if name in problem.states}
+        if guess is not None:
+            raise bare.refused(tool, "a guess_file and apply_tracked_states_to_guess together")
+        guess = MocoTrajectory(times, states, {"states": tuple(states)})
+    return problem, guess
+
+
+def track(
+    tool: MocoTrack,
+    *,
+    folder: str | Path | None = None,
+    more: Callable[[MocoStudy], None] | None = None,
+    tell: Callable[[Progress], None] | None = None,
+) -> MocoSolution:
+    """Find a motion that follows measured states, as OpenSim's MocoTrack.
+
+    Args:
+        tool: its settings.
+        folder: that their files are in; the current folder if None.
+        more: changes the study before it is solved: goals, bounds, settings of the solver.
+        tell: is told of each iteration.
+
+    Raises:
+        OsimliteError: as of :func:`problem_of_track`.
+    """
+    problem, guess = problem_of_track(tool, None, None if folder is None else Path(folder), more)
+    return solved(Program(problem), guess, tell)
+
+
+def _with_speeds(table: StoTable) -> StoTable:
+    """With the derivatives of those values that have no speeds."""
+    ends = [(name, f"{name.removesuffix('/value')}/speed") for name in table.columns if name.endswith("/value")]
+    missing = [(value, speed) for value, speed in ends if speed not in table.columns]
+    if not missing:
+        return table
+    values = np.column_stack([table[value] for value, _ in missing])
+    (speeds,) = derivatives_of_samples(table.times, values, table.times, (1,), HALF_ORDER)
+    columns = (*table.columns, *(speed for _, speed in missing))
+    return replace(table, columns=columns, rows=np.hstack([table.rows, speeds]))
+
+
+def _weights(problem: Problem, tool: MocoTrack, table: StoTable) -> list[MocoWeight]:
+    """Those of the tool; none for what the model's constraints determine."""
+    own = {weight.name: weight.weight for weight in tool.states_weight_set.objects}
+    result = {}
+    for path in problem.functions.coordinates:
+        bound = any(
+            str(getattr(part, "dependent_coordinate_name", "")) == path.rpartition("/")[2]
+            for part in problem.model.constraint_set.objects
+            if part.isEnforced
+        )
+        for name in (f"{path}/value", f"{path}/speed"):
+            if name in table.columns and (name in own or bound):
+                result[name] = own.get(name, 0.0)
+    return [MocoWeight(name=name, weight=weight) for name, weight in result.items()]
+
+
+def _times(problem: Problem, tool: MocoTrack, table: StoTable) -> tuple[float, float]:
+    first, last = float(table.times[0]), float(table.times[-1])
+    start = first if tool.initial_time is None else tool.initial_time
+    end = last if tool.final_time is None else tool.final_time
+    if not first <= start < end <= last:
+        message = f"from {start:g} s to {end:g} s there are no data; they are from {first:g} s to {last:g} s"
+        raise problem.wrong(tool, message)
+    return start, end

@@ -1,0 +1,24 @@
+"""OpenSim's MocoTrack: a motion that follows measured states."""
+
+from __future__ import annotations
+
+from osimlite.tools.job import Job
+from osimlite.tools.moco_study import report
+from osimlite.tools.outcome import Outcome
+
+
+def run(job: Job, outcome: Outcome) -> None:
+    """Find the motion, and write it beside the setup."""
+    # CasADi is loaded with it.
+    from osimlite.optimal.program import Program
+    from osimlite.optimal.solution import solved
+    from osimlite.optimal.track import problem_of_track
+
+    says = outcome.progress
+    told = None if says is None else (lambda progress: says(str(progress)))
+    problem, guess = problem_of_track(job.setup, job.file)
+    solution = solved(Program(problem), guess, told)
+    name = job.setup.name or "MocoTrack"
+    outcome.new_table(job.result(f"{name}_tracked_states.sto"), problem.tables["state_tracking"])
+    outcome.new_table(job.result(f"{name}_solution.sto"), solution.trajectory.table())
+    report(solution, outcome)

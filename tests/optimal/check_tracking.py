@@ -1,0 +1,76 @@
+"""2-D walking that follows a measured gait: opensim-core's example2DWalking."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.moco import MocoTrajectory, evaluated, problem_of_track
+from osimlite.optimal.program import Program
+from tests.conftest import ROOT
+from tests.optimal.studies import moco_found, moco_said, study
+
+WALKING = "OpenSim/Examples/Moco/example2DWalking"
+
+
+@pytest.fixture
+def example():
+    for parent in ROOT.parents:
+        if (folder := parent / "pub-opensim-core" / WALKING).is_dir():
+            return folder
+    return pytest.skip("needs the sources of opensim-core, which are not beside this repository")
+
+
+def gait(intervals):
+    operators = [osimlite.TabOpLowPassFilter(cutoff_frequency=6.0)]
+    return osimlite.MocoTrack(
+        name="gait",
+        model=osimlite.ModelProcessor(filepath="2D_gait.osim"),
+        states_reference=osimlite.TableProcessor(filepath="referenceCoordinates.sto", operators=operators),
+        allow_unused_references=True,
+        track_reference_position_derivatives=True,
+        apply_tracked_states_to_guess=True,
+        initial_time=0.0,
+        final_time=0.470089,
+        mesh_interval=0.470089 / intervals,
+    )
+
+
+def test_moco_s_walk_is_one_here(example, tmp_path):
+    """Its solution has its own cost, term by term, and violates nothing beyond its tolerance."""
+    of_moco = study(tmp_path, "track").problem.phases
+
+    def more(made):
+        phase = made.problem.phases
+        phase.goals[1].weight = 10.0
+        phase.goals += [of_moco.goals[2].copy_deep(), of_moco.goals[3].copy_deep()]
+        phase.state_infos += [info.copy_deep() for info in of_moco.state_infos]
+
+    problem, guess = problem_of_track(gait(10), folder=Path(example), more=more)
+    assert problem.solver.num_mesh_intervals == 10
+    assert guess is not None and len(guess.times) == 50
+    program = Program(problem)
+    terms, missed = evaluated(program, MocoTrajectory.read(moco_found(tmp_path, "walk-10t4")))
+    assert terms == pytest.approx(moco_said("walk-10t4")["terms"], rel=1e-10)
+    assert missed[0].size < 3e-6
+    # What both follow over time is exact where times are variables, too.
+    w = program.layout.guess()
+    way = np.random.default_rng(0).normal(size=len(w)) * 1e-2
+    way[:2] = 0.01, -0.02
+    gradient, numbers = program.slopes(w)
+    change = (program.values(w + 1e-5 * way)[0].sum() - program.values(w - 1e-5 * way)[0].sum()) / 2e-5
+    assert gradient @ way == pytest.approx(change, rel=1e-6)
+    assert np.isfinite(numbers).all()
+
+
+def test_what_tools_do_not_do_is_refused(example):
+    tool = gait(10)
+    tool.final_time = 3.0
+    with pytest.raises(osimlite.OsimliteError, match=r"from 0 s to 3 s there are no data; they are from 0 s to 0.47"):
+        problem_of_track(tool, folder=Path(example))
+    tool.markers_reference.filepath = "markers.trc"
+    with pytest.raises(osimlite.OsimliteError, match="markers are not followed here yet"):
+        problem_of_track(tool, folder=Path(example))
