@@ -46,6 +46,7 @@ PAGES = {
     "osimlite.files": "docs/errors.md#files",
     "osimlite.fitting": "docs/fitting.md",
     "osimlite.gait": "docs/gaits.md",
+    "osimlite.gym": "docs/environments.md",
     "osimlite.lint": "docs/lint-in-ci.md",
     "osimlite.lint.config": "docs/lint-in-ci.md#settings",
     "osimlite.lint.settings": "docs/lint-in-ci.md#settings",

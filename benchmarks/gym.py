@@ -1,0 +1,40 @@
+"""Steps of 10 ms per second of the environments, on all cores.
+
+    python benchmarks/gym.py [COPIES]
+
+Actions are random excitations up to 0.3; copies that fall begin anew.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import gymnasium
+import numpy as np
+
+import osimlite.gym
+from osimlite._cores import cores
+
+STEPS = 100
+
+
+def main() -> None:
+    """Print a line for each environment."""
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 64
+    for name in osimlite.gym.TASKS:
+        envs = gymnasium.make_vec(f"osimlite/{name}", num_envs=count)
+        rng = np.random.default_rng(0)
+        envs.reset(seed=0)
+        actions = [0.3 * rng.random(envs.action_space.shape, dtype=np.float32) for _ in range(STEPS)]
+        envs.step(actions[0])
+        start = time.perf_counter()
+        for action in actions:
+            envs.step(action)
+        rate = count * STEPS / (time.perf_counter() - start)
+        print(f"{name:12s} {rate:10,.0f} steps/s, {count} copies, {cores()} cores")
+        envs.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,100 @@
+"""Several copies of a model that are stepped together, by machine code on all cores."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from osimlite._cores import cores
+from osimlite.multibody.functions import Constant
+from osimlite.multibody.spatial import Array
+from osimlite.schema.model import Model
+from osimlite.simulation.engines.batch import Batch
+from osimlite.simulation.kernels.layout import ITEM, MODEL
+from osimlite.simulation.many import BatchOptions
+from osimlite.simulation.run import Simulation
+
+AT_ONCE = 4
+"""So many copies a thread takes at a time."""
+
+
+class Copies:
+    """Copies of a model, each in a state of its own, driven by controls that are held for a step.
+
+    A copy comes out the same whatever is beside it, and on however many threads.
+
+    Args:
+        model: that is copied; its own controllers add to the controls.
+        count: of the copies.
+        step: length of a step, s.
+        accuracy: of the integrator.
+        integrator: which.
+
+    Attributes:
+        states: of all copies (w, y), in the order of the engine; they are changed in place.
+        controls: names of the actuators, in the order in which controls are given.
+    """
+
+    def __init__(self, model: Model, count: int, step: float, accuracy: float, integrator: str) -> None:
+        self.simulation = simulation = Simulation(model, "compiled")
+        self.engine: Any = simulation.engine
+        own = simulation.forces.controls
+        self.controls = own.names
+        driven = own.driven({name: Constant(0.0) for name in own.names})
+        self.engine.drive(driven)
+        self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
+        self._places = self._places_of(driven)
+        options = BatchOptions(to=step, accuracy=accuracy, integrator=integrator)
+        options.check()
+        vectors = np.tile(self.engine.numbers, (count, 1))
+        self._batch = Batch(self.engine, np.tile(self.start, (count, 1)), options, vectors=vectors, start_holds=True)
+        self._vectors = vectors
+        self._first_step = float(self._batch.clocks[0, 1])
+        self._parts = [(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE)]
+        threads = min(cores(), len(self._parts))
+        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self._rooms = [self._batch.room() for _ in self._parts]
+
+    def _places_of(self, driven: Any) -> NDArray[np.int64]:
+        """Where the numbers of the model have the controls: each is the last number of its function's table."""
+        own, numbers, _ = driven.record()
+        tables = [*own[1 + len(driven.names) :], len(numbers)]
+        last = [own[1 + k] for k in range(len(driven.names))]
+        first = int(self.engine.structure[self.engine.structure[MODEL.CONTROLS] + ITEM.NUMBERS])
+        return np.array([first + tables[end] - 1 for end in last], dtype=np.int64)
+
+    @property
+    def states(self) -> Array:
+        """Of all copies (w, y)."""
+        return self._batch.states
+
+    def put(self, which: Any, states: Array) -> None:
+        """Have copies be in other states."""
+        self._batch.states[which] = states
+        self._batch.clocks[which, 1] = self._first_step
+
+    def step(self, controls: Array) -> NDArray[np.bool_]:
+        """Hold controls (w, c) for a step; which of the copies (w,) could go on to its end."""
+        batch = self._batch
+        self._vectors[:, self._places] = controls
+        batch.clocks[:, 0] = 0.0
+        batch.endings[:] = 0
+        if self._pool is None:
+            for room, part in zip(self._rooms, self._parts, strict=True):
+                batch.run(room, *part)
+        else:
+            work = [
+                self._pool.submit(batch.run, room, *part) for room, part in zip(self._rooms, self._parts, strict=True)
+            ]
+            for each in work:
+                each.result()
+        return (batch.endings == 0) & np.isfinite(batch.states).all(axis=1)
+
+    def close(self) -> None:
+        """Free threads and engine."""
+        if self._pool is not None:
+            self._pool.shutdown()
+        self.simulation.close()
