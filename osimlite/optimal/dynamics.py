@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from osimlite.backends.symbols import casadi
 from osimlite.optimal.point import Formula, Point
+from osimlite.optimal.tendons import ImplicitTendons
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
@@ -25,6 +26,8 @@ class Dynamics:
         self.problem, self.functions = problem, problem.functions
         self.is_implicit = problem.solver.multibody_dynamics_mode == "implicit"
         self.size = len(self.functions.coordinates)
+        self.tendons = ImplicitTendons(problem)
+        self._first_rate = self.size if self.is_implicit else 0
 
     def rates(self, point: Point) -> Formula:
         """The derivative of the whole state."""
@@ -41,8 +44,16 @@ class Dynamics:
             mass = casadi.jacobian(rows, symbol[size : 2 * size])
             accelerations = casadi.ldl_solve(-missing, *casadi.ldl(mass))
         else:
-            return casadi.vertcat(speeds, f.dynamics(point.t, point.x, point.u, point.p)[size:])
-        return casadi.vertcat(speeds, accelerations, self._auxiliary(point))
+            found = f.dynamics(point.t, point.x, point.u, point.p)
+            return self._with_rates(point, casadi.vertcat(speeds, found[size:]))
+        return self._with_rates(point, casadi.vertcat(speeds, accelerations, self._auxiliary(point)))
+
+    def _with_rates(self, point: Point, rates: Formula) -> Formula:
+        """Rates of tendon forces that are variables, in their places."""
+        for number, path in enumerate(self.tendons.paths):
+            place = self.functions.states.index(f"{path}/normalized_tendon_force")
+            rates[place] = point.derivatives[self._first_rate + number]
+        return rates
 
     def _auxiliary(self, point: Point) -> Formula:
         """Rates of the auxiliary states by the laws."""
@@ -59,11 +70,12 @@ class Dynamics:
 
     def residuals(self, point: Point) -> tuple[list[str], Formula]:
         """What must be zero at all points, with its names."""
+        names, errors = self.tendons.residuals(point, point.derivatives[self._first_rate :])
         if not self.is_implicit:
-            return [], casadi.SX(0, 1)
+            return names, errors
         f, size = self.functions, self.size
         rows = f.residual(point.t, point.x, point.rates, point.u, point.p, point.multipliers)[size : 2 * size]
-        return [f"{path} residual" for path in f.coordinates], rows
+        return [*(f"{path} residual" for path in f.coordinates), *names], casadi.vertcat(rows, errors)
 
     def constraint_errors(self, point: Point, with_derivatives: bool) -> tuple[list[str], Formula]:
         """Errors of the model's constraints, with their names."""

@@ -40,17 +40,21 @@ class Layout:
             "states": [*functions.states],
             "controls": [*functions.controls],
             "multipliers": multipliers,
-            "derivatives": accelerations,
+            "derivatives": [*accelerations, *problem.dynamics.tendons.names],
             "slacks": problem.slack_names,
         }
         force = range_of(problem.phase.multiplier_bounds) or (-np.inf, np.inf)
         acceleration = range_of(solver.implicit_multibody_acceleration_bounds) or (-np.inf, np.inf)
+        rate = range_of(solver.implicit_auxiliary_derivative_bounds) or (-np.inf, np.inf)
         correction = range_of(solver.velocity_correction_bounds) or (-np.inf, np.inf)
         self.bounds: dict[str, list[Bounds]] = {
             "states": [*problem.states.values()],
             "controls": [*problem.controls.values()],
             "multipliers": [Bounds.of(force)] * len(multipliers),
-            "derivatives": [Bounds.of(acceleration)] * len(accelerations),
+            "derivatives": [
+                *[Bounds.of(acceleration)] * len(accelerations),
+                *[Bounds.of(rate)] * len(problem.dynamics.tendons.names),
+            ],
             "slacks": [Bounds.of(correction)] * len(problem.slack_names),
         }
         self.shared = 2 + len(problem.parameters)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property, partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,12 +19,12 @@ from osimlite.modifying.processing import processed
 from osimlite.multibody.spatial import Array
 from osimlite.optimal.bounds import FREE, Range, control_bounds, range_of, state_bounds
 from osimlite.optimal.dynamics import Dynamics
-from osimlite.optimal.point import Series, Terms
+from osimlite.optimal.point import Formula, Point, Series, Terms, integral
 from osimlite.optimal.schemes import Grid, scheme_named
 from osimlite.schema.base import Component, Object
 from osimlite.schema.controllers import Controller
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.moco.goals import MocoGoal
+from osimlite.schema.moco.goals import MocoControlGoal, MocoGoal
 from osimlite.schema.moco.parts import MocoWeightSet
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoStudy
 from osimlite.schema.model import Model
@@ -95,10 +95,10 @@ class Problem:
         self.constraint_names = self._constraint_names()
         self.grid = Grid.of(scheme_named(self.solver.transcription_scheme), self._mesh())
         self.dynamics = Dynamics(self)
-        self._refuse_implicit_tendons()
         self._refuse_settings()
         self.goals: list[tuple[MocoGoal, Terms]] = [
-            (goal, self._terms(goal)) for goal in self.phase.goals if goal.enabled
+            *((goal, self._terms(goal)) for goal in self.phase.goals if goal.enabled),
+            *self._costs_of_solver(),
         ]
         for constraint in self.phase.path_constraints:
             raise self.refused(constraint, "path constraints are not solved here yet")
@@ -186,27 +186,34 @@ class Problem:
             if type(part).tag == "PositionMotion":
                 raise self.refused(self.phase, f"a motion that is given (PositionMotion '{part.path}')")
 
-    def _refuse_implicit_tendons(self) -> None:
-        for part in self.components.values():
-            mode = getattr(part, "tendon_compliance_dynamics_mode", "explicit")
-            if mode == "implicit" and not getattr(part, "ignore_tendon_compliance", True):
-                message = (
-                    f"the tendon of {part.path} is of the implicit kind; take tendon_compliance_dynamics_mode explicit"
-                )
-                raise self.refused(self.phase, message)
-
     def _refuse_settings(self) -> None:
-        for name in (
-            "minimize_lagrange_multipliers",
-            "minimize_implicit_multibody_accelerations",
-            "minimize_implicit_auxiliary_derivatives",
-            "scale_variables_using_bounds",
-        ):
-            # What there is nothing of costs nothing: tools of Moco ask for it in any case.
-            if getattr(self.solver, name) and name != "minimize_implicit_auxiliary_derivatives":
-                raise self.refused(self.solver, f"{name} is not done here yet")
+        if self.solver.scale_variables_using_bounds:
+            raise self.refused(self.solver, "scale_variables_using_bounds is not done here yet")
         if self.solver.optim_solver != "ipopt":
             raise self.refused(self.solver, f"of optimizers only ipopt is known, not {self.solver.optim_solver}")
+
+    def _costs_of_solver(self) -> Iterator[tuple[MocoGoal, Terms]]:
+        """Squares of variables that the solver's own settings make a cost, named as in Moco."""
+        solver, first = self.solver, len(self.functions.coordinates) if self.dynamics.is_implicit else 0
+        if solver.minimize_lagrange_multipliers and not self.constraint_names:
+            raise self.wrong(solver, "minimize_lagrange_multipliers needs constraints, and the model has none")
+        for name, wanted, weight, part in (
+            ("multipliers", solver.minimize_lagrange_multipliers, solver.lagrange_multiplier_weight, "multipliers"),
+            (
+                "accelerations",
+                solver.minimize_implicit_multibody_accelerations and self.dynamics.is_implicit,
+                solver.implicit_multibody_accelerations_weight,
+                slice(None, first),
+            ),
+            (
+                "auxiliary_derivatives",
+                solver.minimize_implicit_auxiliary_derivatives and bool(self.dynamics.tendons.names),
+                solver.implicit_auxiliary_derivatives_weight,
+                slice(first, None),
+            ),
+        ):
+            if wanted:
+                yield MocoControlGoal(name=name, weight=weight), integral(partial(_squares, part))
 
     def _parameter_paths(self, parameter: Any) -> list[str]:
         element = parameter.property_element
@@ -270,6 +277,12 @@ class Problem:
         """Of the corrections of velocities."""
         wanted = self.solver.enforce_constraint_derivatives
         return [f"gamma_{name}" for name in self.constraint_names] if wanted else []
+
+
+def _squares(part: str | slice, point: Point) -> Formula:
+    """Of the multipliers, or of some of the derivatives that are variables."""
+    column = point.multipliers if isinstance(part, str) else point.derivatives[part]
+    return column.T @ column
 
 
 def _by_constraint(model: Model, count: int) -> Iterable[tuple[int, int]]:

@@ -105,6 +105,26 @@ def test_the_file_comes_back_and_starts_another_search(tmp_path):
     assert warm.objective == pytest.approx(found.objective, rel=1e-4)
 
 
+def test_implicit_tendons(tmp_path):
+    """Moco's hanging muscle: its solution fulfils the equilibrium of tendon and fibers, and ours is as good."""
+
+    def hanging():
+        given = study(tmp_path, "hanging-25")
+        # What is left out is 1e-11 of the objective.
+        given.problem.phases.goals[1].enabled = False
+        return given
+
+    said = moco_said("hanging-25")
+    program = Program(problem_of(hanging()))
+    terms, missed = evaluated(program, MocoTrajectory.read(moco_found(tmp_path, "hanging-25")))
+    assert terms == {"goal": pytest.approx(said["terms"]["goal"], rel=1e-9)}
+    assert missed[0].size < said["ctol"]
+    found = solve(hanging())
+    assert found.success
+    assert found.objective <= said["objective"] * (1.0 + 1e-4)
+    assert "/forceset/muscle/implicitderiv_normalized_tendon_force" in found.trajectory.names["derivatives"]
+
+
 def test_progress_names_what_is_violated_and_when(tmp_path):
     told = []
     found = solve(study(tmp_path, "pendulum-50", optim_max_iterations=6), tell=told.append)
@@ -143,7 +163,20 @@ def test_what_is_not_solved_is_refused_by_name_and_place(tmp_path):
         solve(path)
 
 
-@pytest.mark.parametrize("setting", ["minimize_lagrange_multipliers", "scale_variables_using_bounds"])
-def test_settings_without_effect_are_refused(setting, tmp_path):
-    with pytest.raises(osimlite.OsimliteError, match=f"{setting} is not done here yet"):
-        problem_of(study(tmp_path, "sliding-100", **{setting: True}))
+def test_settings_without_effect_are_refused(tmp_path):
+    with pytest.raises(osimlite.OsimliteError, match="scale_variables_using_bounds is not done here yet"):
+        problem_of(study(tmp_path, "sliding-100", scale_variables_using_bounds=True))
+    with pytest.raises(osimlite.OsimliteError, match="needs constraints, and the model has none"):
+        problem_of(study(tmp_path, "sliding-100", minimize_lagrange_multipliers=True))
+
+
+def test_what_the_solver_makes_a_cost(tmp_path):
+    choices = {"minimize_implicit_multibody_accelerations": True, "implicit_multibody_accelerations_weight": 1e-3}
+    found = solve(study(tmp_path, "pendulum-50", multibody_dynamics_mode="implicit", **choices))
+    accelerations = [found.trajectory.columns[name] for name in found.trajectory.names["derivatives"]]
+    squares, times = np.square(accelerations).sum(axis=0), found.trajectory.times
+    # Simpson's rule over each interval and its middle.
+    each = (squares[:-2:2] + 4.0 * squares[1::2] + squares[2::2]) * (times[2::2] - times[:-2:2]) / 6.0
+    assert found.terms["accelerations"] == pytest.approx(1e-3 * each.sum(), rel=1e-9)
+    held = solve(study(tmp_path, "squat-25", minimize_lagrange_multipliers=True, lagrange_multiplier_weight=1e-6))
+    assert found.success and held.success and 0.0 < held.terms["multipliers"] < 1e-3

@@ -1,0 +1,58 @@
+"""Tendons of the implicit kind: the rate of their force is a variable, and equilibrium with the fibers an equation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from osimlite.backends.symbolic import on_symbols
+from osimlite.backends.symbols import casadi
+from osimlite.forces.muscles import MuscleInputs
+from osimlite.forces.smooth_muscles import BELOW, SmoothMuscle, SmoothTendon, degroote_residual
+from osimlite.optimal.point import Formula, Point
+from osimlite.schema.muscles import DeGrooteFregly2016Muscle
+
+if TYPE_CHECKING:
+    from osimlite.optimal.problem import Problem
+
+
+class ImplicitTendons:
+    """The muscles of De Groote and Fregly whose ``tendon_compliance_dynamics_mode`` is implicit.
+
+    Attributes:
+        paths: of the muscles.
+        names: of the rates, as Moco has them.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.muscles: list[tuple[str, SmoothMuscle, SmoothTendon]] = []
+        for element in problem.functions.forces.elements:
+            part = problem.components.get(element.path)
+            if (
+                isinstance(part, DeGrooteFregly2016Muscle)
+                and part.tendon_compliance_dynamics_mode == "implicit"
+                and not part.ignore_tendon_compliance
+            ):
+                values = {type(each): each for each in element.values}  # type: ignore[attr-defined]
+                self.muscles.append((element.path, values[SmoothMuscle], values[SmoothTendon]))
+        self.paths = [path for path, _, _ in self.muscles]
+        self.names = [f"{path}/implicitderiv_normalized_tendon_force" for path in self.paths]
+
+    def residuals(self, point: Point, rates: Formula) -> tuple[list[str], Formula]:
+        """By how much each tendon's force exceeds what the fibers bear, over the muscle's strength.
+
+        The tendon lengthens by what its force's rate asks for, and the fibers by the rest of what the path does.
+        """
+        if not self.muscles:
+            return [], casadi.SX(0, 1)
+        functions, rows = self.problem.functions, []
+        lengths, speeds, _ = functions.paths(point.t, point.x, point.p)
+        residual = on_symbols(degroote_residual)
+        for number, (path, muscle, tendon) in enumerate(self.muscles):
+            place = functions.path_names.index(path)
+            force = point.state(f"{path}/normalized_tendon_force")
+            activation = point.state(f"{path}/activation") if muscle.follows else point.control(path)
+            stretch = muscle.slack * rates[number] / (tendon.growth * (force + BELOW))
+            given = lengths[place], speeds[place] - stretch, point.control(path), activation, 0.0, 0.0, force
+            rows.append(residual(force, MuscleInputs(*given), muscle, tendon))
+        return [f"{path} equilibrium" for path in self.paths], casadi.vertcat(*rows)
