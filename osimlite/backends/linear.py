@@ -1,4 +1,4 @@
-"""A model near one of its states: xdot - f = A (x - x0) + B (u - u0)."""
+"""A model near one of its states: xdot - f = A (x - x0) + B (u - u0), y - y0 = C (x - x0) + D (u - u0)."""
 
 from __future__ import annotations
 
@@ -31,6 +31,10 @@ class Linearization:
         xdot: derivative of the state there (x,).
         A: its derivative by the state (x, x), exact.
         B: that by the controls (x, u), exact.
+        outputs: names of the entries of y, as ``GROUP:ENTRY``, those that were asked for.
+        y: the outputs there (y,).
+        C: their derivative by the state (y, x), exact.
+        D: that by the controls (y, u), exact.
     """
 
     states: tuple[str, ...]
@@ -41,6 +45,10 @@ class Linearization:
     xdot: Array
     A: Array
     B: Array
+    outputs: tuple[str, ...]
+    y: Array
+    C: Array
+    D: Array
 
 
 def linearize(
@@ -48,6 +56,7 @@ def linearize(
     state: Given = None,
     controls: Given = None,
     *,
+    outputs: Sequence[str] = (),
     time: float = 0.0,
     folder: str | Path | None = None,
 ) -> Linearization:
@@ -60,11 +69,13 @@ def linearize(
         model: that moves, or its functions (:func:`osimlite.casadi`), which are made once then.
         state: numbers by the names of states, the others as the model has them, or all (x,) in their order.
         controls: numbers by the paths of actuators, the others 0, or all (u,).
+        outputs: what is observed, in the order of y: groups of `CasadiModel.output_names` (``mass_center``), or single
+            entries of these (``mass_center:y``, ``forces:/forceset/soleus_r|tension``).
         time: s.
         folder: where the model's file is, for the files that it names; the folder that the program runs in if None.
 
     Raises:
-        SettingError: there is no such state or control.
+        SettingError: there is no such state, control or output.
 
     Other errors are those of :func:`osimlite.casadi`.
     """
@@ -74,7 +85,40 @@ def linearize(
     x = _filled("state", model.states, model.x, state)
     u = _filled("control", model.controls, model.u, controls)
     xdot, a, b = (np.array(part.full()) for part in model.linear(time, x, u, model.p))
-    return Linearization(model.states, model.controls, time, x, u, xdot[:, 0], a, b)
+    chosen = _chosen(model, outputs) if outputs else []
+    y, c, d = _observed(model, chosen, time, x, u)
+    names = tuple(f"{group}:{model.output_names[group][k]}" for group, k in chosen)
+    return Linearization(model.states, model.controls, time, x, u, xdot[:, 0], a, b, names, y[:, 0], c, d)
+
+
+def _chosen(model: CasadiModel, names: Sequence[str]) -> list[tuple[str, int]]:
+    """The groups of outputs and the places in these that names stand for."""
+    groups = {group: [(group, k) for k in range(len(labels))] for group, labels in model.output_names.items()}
+    single = {
+        f"{group}:{label}": [(group, k)]
+        for group, labels in model.output_names.items()
+        for k, label in enumerate(labels)
+    }
+    known, result = {**groups, **single}, list[tuple[str, int]]()
+    for name in names:
+        if name not in known:
+            raise SettingError(f"the model has no output '{name}'{did_you_mean(name, known)}")
+        result += known[name]
+    return result
+
+
+def _observed(model: CasadiModel, chosen: Sequence[tuple[str, int]], time: float, x: Array, u: Array) -> list[Array]:
+    """Outputs (y, 1), and their derivatives by the state and by the controls."""
+    if not chosen:
+        return [np.zeros((0, size)) for size in (1, len(x), len(u))]
+    from osimlite.backends.symbols import casadi
+
+    state, control = casadi.MX.sym("x", len(x)), casadi.MX.sym("u", len(u))
+    columns = model.outputs.call({"t": time, "x": state, "u": control, "p": model.p})
+    y = casadi.vertcat(*(columns[group][k] for group, k in chosen))
+    slopes = [casadi.jacobian(y, of) for of in (state, control)]
+    found = casadi.Function("observed", [state, control], [y, *slopes])(x, u)
+    return [np.array(part.full()) for part in found]
 
 
 def _filled(what: str, names: Sequence[str], default: Array, given: Any) -> Array:

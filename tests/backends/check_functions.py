@@ -258,3 +258,31 @@ def test_a_linearization_is_that_of_the_functions():
         osimlite.linearize(f, None, {"knee": 1.0})
     with pytest.raises(osimlite.OsimliteError, match="states, not 1"):
         osimlite.linearize(f, [1.0])
+
+
+def test_outputs_are_linearized_by_their_names():
+    f = beside("m0036").functions
+    force = next(name for name in f.output_names["forces"] if name.endswith("|tension"))
+    x, u = beside("m0036").state(3), np.full(len(f.controls), 0.4)
+    near = osimlite.linearize(f, x, u, outputs=[f"forces:{force}", "mass_center_velocity"])
+    assert near.outputs == (f"forces:{force}", *(f"mass_center_velocity:{axis}" for axis in "xyz"))
+
+    def observed(x, u):
+        found = f.outputs.call({"t": 0.0, "x": x, "u": u, "p": f.p})
+        tension = matrix(found["forces"])[f.output_names["forces"].index(force)]
+        return np.concatenate((tension, matrix(found["mass_center_velocity"]).ravel()))
+
+    assert np.array_equal(near.y, observed(x, u))
+    for of, wanted in ((x, near.C), (u, near.D)):
+        for k, column in enumerate(wanted.T):
+            change = np.eye(len(of))[k]
+
+            def along(h, of=of, change=change):
+                return observed(x + h * change, u) if of is x else observed(x, u + h * change)
+
+            assert np.abs(slope(along, 1e-3) - column).max() < 1e-8 * max(1.0, np.abs(wanted).max())
+    assert near.C.any() and near.D[0].any() and not near.D[1:].any()
+    with pytest.raises(osimlite.OsimliteError, match="no output 'mass_centre'; did you mean 'mass_center'"):
+        osimlite.linearize(f, outputs=["mass_centre"])
+    none = osimlite.linearize(f)
+    assert none.C.shape == (0, len(x)) and none.D.shape == (0, len(u)) and none.outputs == ()

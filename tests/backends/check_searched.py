@@ -60,6 +60,9 @@ def test_wrapped_paths_are_those_of_the_kernels():
         one, two = (derivative(x + s * e, u) - derivative(x - s * e, u) for s in (1.0, 2.0))
         slopes[:, k] = (8.0 * one - two) / (12.0 * h)
     assert np.abs(near.A - slopes).max() <= 1e-6 * np.abs(slopes).max()
+    moves = osimlite.linearize(functions, x, u, outputs=["mass_center", "mass_center_velocity", "forces"])
+    n = len(functions.coordinates)
+    assert moves.C[:3, :n] == pytest.approx(moves.C[3:6, n : 2 * n], abs=1e-12) and moves.C[6:].any()
     lengths, _, arms = functions.paths(0.0, x, functions.p)
     known = osimlite.paths(model)
     q = {path: float(value) for path, value in zip(functions.coordinates, x, strict=False)}
