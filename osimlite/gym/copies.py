@@ -40,7 +40,8 @@ class Copies:
 
     def __init__(self, model: Model, count: int, step: float, accuracy: float, integrator: str) -> None:
         self.simulation = simulation = Simulation(model, "compiled")
-        self.engine: Any = simulation.engine
+        engine: Any = simulation.engine
+        self.engine = engine
         own = simulation.forces.controls
         self.controls = own.names
         driven = own.driven({name: Constant(0.0) for name in own.names})
@@ -49,8 +50,8 @@ class Copies:
         self._places = self._places_of(driven)
         options = BatchOptions(to=step, accuracy=accuracy, integrator=integrator)
         options.check()
-        vectors = np.tile(self.engine.numbers, (count, 1))
-        self._batch = Batch(self.engine, np.tile(self.start, (count, 1)), options, vectors=vectors, start_holds=True)
+        vectors = np.tile(engine.numbers, (count, 1))
+        self._batch = Batch(engine, np.tile(self.start, (count, 1)), options, vectors=vectors, start_holds=True)
         self._vectors = vectors
         self._first_step = float(self._batch.clocks[0, 1])
         self._parts = [(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE)]

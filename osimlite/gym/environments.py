@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -103,7 +103,7 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
     actions are the controls of the actuators, named by `controls`.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 100}
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012 - as gymnasium has it
 
     def __init__(
         self,
@@ -148,9 +148,11 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
     Copies whose episode is over begin anew with the next step, whose action is not used.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
-        "render_modes": ["rgb_array"], "render_fps": 100, "autoreset_mode": AutoresetMode.NEXT_STEP,
-    }  # fmt: skip
+    metadata = {  # noqa: RUF012 - as gymnasium has it
+        "render_modes": ["rgb_array"],
+        "render_fps": 100,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
 
     def __init__(
         self,
