@@ -18,6 +18,8 @@ from osimlite.optimal.hessian import Hessian
 from osimlite.optimal.program import Program
 from osimlite.records import dataclass
 
+MANY = 1500
+"""Of fewer variables METIS takes longer than its order saves."""
 NEAR = 1e-4
 """Of two iterates that violate nothing by more than this the cheaper one is the better."""
 
@@ -149,8 +151,9 @@ def _options(program: Program) -> dict[str, Any]:
     """As Moco sets them."""
     settings, options = program.problem.solver, dict[str, Any]()
     options["hessian_approximation"] = settings.optim_hessian_approximation
-    # METIS orders what hangs together over time in half of what MUMPS takes by its own choice.
-    options["mumps_pivot_order"] = 5
+    if len(program.layout.lower) > MANY:
+        # METIS orders what hangs together over time in half of what MUMPS takes by its own choice.
+        options["mumps_pivot_order"] = 5
     if settings.optim_max_iterations != -1:
         options["max_iter"] = settings.optim_max_iterations
     if (tolerance := settings.optim_convergence_tolerance) != -1.0:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 import casadi
 import numpy as np
 import pytest
@@ -133,6 +135,23 @@ def test_progress_names_what_is_violated_and_when(tmp_path):
     assert found.status == "Maximum_Iterations_Exceeded"
     assert "defect at" in str(told[1])
     assert found.violations[0].size >= found.violations[-1].size > 0.0
+
+
+def test_an_interrupt_keeps_the_best_so_far(tmp_path):
+    told = []
+
+    def tell(progress):
+        told.append(progress)
+        if progress.iteration == 8:
+            signal.raise_signal(signal.SIGINT)
+
+    before = signal.getsignal(signal.SIGINT)
+    found = solve(study_file(tmp_path, "pendulum-50"), tell=tell)
+    assert signal.getsignal(signal.SIGINT) is before
+    assert (found.success, found.status) == (False, "User_Requested_Stop")
+    assert len(told) < 12
+    least = min(progress.worst.size for progress in told)
+    assert found.violations[0].size == pytest.approx(least, rel=1e-6)
 
 
 def test_parameters_are_found(tmp_path):
