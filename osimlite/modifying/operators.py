@@ -260,5 +260,6 @@ def _loads(model: Model, operator: p.ModOpAddExternalLoads, folder: Path) -> Non
     file = folder / operator.filepath.strip()
     loads = read_document(Source.of_file(file), of=ExternalLoads).top
     assert isinstance(loads, ExternalLoads)
+    loads.name = "externalloads"  # OpenSim loses the name that the file says.
     loads.datafile = str((file.parent / loads.datafile.strip()).absolute())
     model.add(loads)

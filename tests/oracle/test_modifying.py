@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 import osimlite
+from osimlite.modifying.path_fitting import fit_paths
 from osimlite.modifying.processing import processed
 from osimlite.schema.difference import differences
 from osimlite.schema.tools import processors as p
@@ -62,3 +63,42 @@ def test_the_model_is_that_of_opensim(corpus: Any, tmp_path: Path, case: str, nu
         pytest.skip("an arm has no feet")
     path = next(item.path for item in corpus if item.id == number)
     assert not changed(tmp_path, path, CASES[case])
+
+
+LOADS = """<?xml version="1.0" encoding="UTF-8" ?>
+<OpenSimDocument Version="40600">
+	<ExternalLoads name="own">
+		<objects>
+			<ExternalForce name="push">
+				<applied_to_body>r_humerus</applied_to_body>
+				<force_expressed_in_body>ground</force_expressed_in_body>
+				<point_expressed_in_body>ground</point_expressed_in_body>
+				<force_identifier>force_v</force_identifier>
+				<point_identifier>force_p</point_identifier>
+			</ExternalForce>
+		</objects>
+		<datafile>push.sto</datafile>
+	</ExternalLoads>
+</OpenSimDocument>
+"""
+LABELS = ("time", *(f"force_{kind}{axis}" for kind in "vp" for axis in "xyz"))
+TABLE = "push\nversion=1\nnRows=2\nnColumns=7\ninDegrees=no\nendheader\n" + "\n".join(
+    "\t".join(row) for row in (LABELS, ("0", *"123456"), ("1", *"123456"))
+)
+
+
+def test_files_of_loads_and_paths_are_put_in_as_there(corpus: Any, tmp_path: Path) -> None:
+    """Paths that were fitted here are read there."""
+    path = next(item.path for item in corpus if item.id == "m0001")
+    (tmp_path / "loads.xml").write_text(LOADS)
+    (tmp_path / "push.sto").write_text(TABLE + "\n")
+    model = osimlite.read(path)
+    paths = [item.path for item in fit_paths(model, poses=60)]
+    osimlite.write(p.FunctionBasedPathSet(name="paths", objects=paths), tmp_path / "paths.xml")
+    operators = [
+        p.ModOpReplacePathsWithFunctionBasedPaths(paths_file="paths.xml"),
+        p.ModOpAddExternalLoads(filepath="loads.xml"),
+    ]
+    # Here the whole path of the data, so that the model finds it from any folder.
+    (data,) = changed(tmp_path, path, operators)
+    assert "what='datafile'" in data and f"old='{tmp_path / 'push.sto'}', new='push.sto'" in data
