@@ -52,7 +52,7 @@ def processed_table(problem: Problem, part: Object, processor: TableProcessor) -
             table = replace(table, columns=tuple(_absolute(name, problem.functions.states) for name in table.columns))
         else:
             raise problem.refused(operator, "this operator on tables is not applied here")
-    return _in_radians(table, problem.functions.mechanism)
+    return replace(_in_radians(table, problem.functions.mechanism), header={"inDegrees": "no"})
 
 
 def _filtered(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import osimlite
 from osimlite.moco import MocoTrajectory, evaluated, problem_of_track
 from osimlite.optimal.program import Program
+from osimlite.simulation.files.storage import read_sto
 from tests.conftest import ROOT
 from tests.optimal.studies import moco_found, moco_said, study
 
@@ -74,3 +76,18 @@ def test_what_tools_do_not_do_is_refused(example):
     tool.markers_reference.filepath = "markers.trc"
     with pytest.raises(osimlite.OsimliteError, match="markers are not followed here yet"):
         problem_of_track(tool, folder=Path(example))
+
+
+def test_a_setup_is_run(example, tmp_path):
+    for name in ("2D_gait.osim", "referenceCoordinates.sto"):
+        shutil.copy(Path(example) / name, tmp_path)
+    osimlite.write(gait(2), tmp_path / "track.xml")
+    lines = []
+    outcome = osimlite.run(tmp_path / "track.xml", progress=lines.append)
+    assert outcome.done and outcome.summary["status"] == "Solve_Succeeded"
+    assert sorted(path.name for path in outcome.files) == ["gait_solution.sto", "gait_tracked_states.sto"]
+    assert "largest violation /jointset/" in lines[0]
+    written = MocoTrajectory.read(tmp_path / "gait_solution.sto")
+    assert float(written.header["objective"]) == pytest.approx(outcome.summary["objective"], abs=1e-6)
+    followed = read_sto(tmp_path / "gait_tracked_states.sto")
+    assert len(followed.columns) == 20 and len(followed.times) == 50
