@@ -156,7 +156,7 @@ def _moved(q: Array, k: int, by: float) -> Array:
 
 
 def _is_searched(element: Any) -> bool:
-    if not (isinstance(element, DeclaredForce) and element.kind.geometry is PATH):
+    if not (isinstance(element, DeclaredForce) and element.kind.geometry is PATH) or element.place is None:
         return False
     surfaces = getattr(element.place, "surfaces", None)
     return bool(surfaces) if surfaces is not None else not hasattr(element.place, "length")

@@ -102,3 +102,10 @@ def test_damped_muscles_of_millard():
     for x, u in states_near(functions, 2, 3):
         found, wanted = functions.dynamics(0.0, x, u, functions.p).full().ravel(), derivative(x, u)
         assert np.abs(found - wanted).max() <= 1e-9 * max(1.0, np.abs(wanted).max())
+
+
+@pytest.mark.skipif(not GAIT.exists(), reason="needs the shared reference folder")
+def test_muscles_that_have_no_path_are_left_as_they_are():
+    file = GAIT.parent / "m0189/arm26.osim"
+    functions = osimlite.casadi(osimlite.read(file), folder=file.parent)
+    assert np.isfinite(functions.dynamics(0.0, functions.x, functions.u, functions.p).full()).all()
