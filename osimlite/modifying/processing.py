@@ -40,8 +40,9 @@ def apply(model: Model, operators: Iterable[ModelOperator], folder: str | Path =
     for operator in operators:
         operation = OPERATIONS.get(type(operator))
         if operation is None:
+            name = getattr(operator, "class_name", "") or type(operator).__name__
             known = ", ".join(cls.__name__ for cls in OPERATIONS)
-            raise UnsupportedError(f"a {type(operator).__name__} cannot be applied; there are {known}")
+            raise UnsupportedError(f"a {name} cannot be applied; there are {known}")
         operation(model, operator, Path(folder))
 
 
