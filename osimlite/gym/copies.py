@@ -81,8 +81,9 @@ class Copies:
         """Hold controls (w, c) for a step; which of the copies (w,) could go on to its end."""
         batch = self._batch
         self._vectors[:, self._places] = controls
+        # Each step is a run of its own: a method that goes by earlier steps has none, those of other copies least of all.
         batch.clocks[:, 0] = 0.0
-        batch.endings[:] = 0
+        batch.counts[:] = batch.endings[:] = 0
         if self._pool is None:
             for room, part in zip(self._rooms, self._parts, strict=True):
                 batch.run(room, *part)

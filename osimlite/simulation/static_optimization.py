@@ -230,8 +230,12 @@ class StaticOptimization:
         result: Array = shared[..., 0] * self.optimal_forces
         return result
 
-    def responses(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array]:
-        """Accelerations of all coordinates in one pose, without actuators (n,) and by each force of 1 (n, a)."""
+    def responses(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array, Array]:
+        """Accelerations of all coordinates in one pose.
+
+        Returns:
+            Without actuators (n,), by each actuator's force of 1 (n, a), and by each generalized force of 1 (n, n).
+        """
         system, order = self._system, list(self._system.order)
         udot, ways = self._allowed(times, values, speeds, np.zeros_like(values))
         moments = np.column_stack([times, system.state.rows(values, speeds)])
@@ -243,8 +247,9 @@ class StaticOptimization:
         turned = ways[0]
         mass = turned[order].T @ (taken[1:] - taken[0]).T @ turned[order]
         right = np.column_stack([-needed[0], (pushes[0] / self.optimal_forces[:, None]).T])
-        found = turned @ np.linalg.solve(mass, turned[order].T @ right)
-        return udot[0] + found[:, 0], found[:, 1:]
+        found = turned @ np.linalg.solve(mass, np.hstack([turned[order].T @ right, turned.T]))
+        count = 1 + len(self.names)
+        return udot[0] + found[:, 0], found[:, 1:count], found[:, count:]
 
     def _allowed(self, times: Array, values: Array, speeds: Array, wanted: Array) -> tuple[Array, Array]:
         """Accelerations (t, n) that the constraints allow, and what moves with each free coordinate (t, n, m).

@@ -63,7 +63,7 @@ def track(job: Job, outcome: Outcome, model: Model, desired: Desired, window: fl
             bounds = setup.minimum_integrator_step_size, setup.maximum_integrator_step_size
             settings = Settings(setup.integrator_error_tolerance, step_bounds=bounds)
             before = followed.errors
-            followed = tracker.follow(start, y, end - window - 2.0**-45.5, settings)
+            followed = tracker.follow(start, y, end - window, settings)
             followed.errors = before | followed.errors
         if followed.failure:
             outcome.done = False

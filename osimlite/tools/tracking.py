@@ -35,7 +35,7 @@ LEAST_SHARE = 1e-6
 WEAK = 1e-9
 """Part of its greatest force that a muscle can give at least, if it is to be asked for any."""
 RANK = 1e-10
-"""Of the largest singular value: what is below is none."""
+"""Of the largest eigenvalue: what is below is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,8 +232,9 @@ class Sharing:
             lame = [name for name, force in zip(self.names, self.optimal, strict=True) if not force]
             raise job.error(f"{listed(lame)} can have no force: the optimal force is 0; give another")
 
-    def accelerations(self, t: float, q: Array, u: Array) -> tuple[Array, Array]:
-        """Of all coordinates: without forces of actuators (n,), and by each force of 1 N or N m (n, a)."""
+    def accelerations(self, t: float, q: Array, u: Array) -> tuple[Array, Array, Array]:
+        """Of all coordinates: without forces of actuators (n,), by each force (n, a) and by each generalized force
+        (n, n) of 1 N or N m."""
         times, values, speeds = np.array([t]), q[None], u[None]
         return self._unit.responses(times, values, speeds)
 
@@ -241,11 +242,11 @@ class Sharing:
         self, t: float, q: Array, u: Array, wanted: Array, errors: Array, bounds: tuple[Array, Array]
     ) -> tuple[Array, str]:
         """Forces (a,) within bounds that give the tasks' wanted accelerations, and what is lacking, if anything."""
-        still, each = self.accelerations(t, q, u)
+        still, each, lightness = self.accelerations(t, q, u)
         own = self.tasks.coordinates
         columns, rest = each[own], wanted - still[own]
         if self.exact:
-            return self._least(t, q, u, columns, rest, bounds)
+            return self._least(t, q, u, columns, rest, lightness[np.ix_(own, own)], bounds)
         weights = np.sqrt(self.tasks.weights)
         share = math.sqrt(self.tasks.force_weight(errors))
         # What is left of the accelerations is an unknown too, whose square is to be small as those of the others.
@@ -257,7 +258,14 @@ class Sharing:
         return found[0, : len(scale)] * scale, ""
 
     def _least(
-        self, t: float, q: Array, u: Array, columns: Array, rest: Array, bounds: tuple[Array, Array]
+        self,
+        t: float,
+        q: Array,
+        u: Array,
+        columns: Array,
+        rest: Array,
+        lightness: Array,
+        bounds: tuple[Array, Array],
     ) -> tuple[Array, str]:
         assert self._strong is not None
         strengths = self._strong.strengths(np.array([t]), q[None], u[None])
@@ -268,11 +276,11 @@ class Sharing:
         each, left = columns[counted][:, able], (rest - columns[:, ~able] @ forces[~able])[counted]
         scale = strengths[able]
         scaled = np.sort(np.array(bounds)[:, able] / scale, axis=0)
-        # Accelerations of feet and of the pelvis differ by orders of magnitude; combined so, all weigh the same.
-        turned, sizes, rows = np.linalg.svd(each * scale, full_matrices=False)
-        sure = sizes > RANK * sizes[0]
-        turned, sizes, rows = turned[:, sure], sizes[sure], np.ascontiguousarray(rows[sure].T)
-        result, _, solved = least_effort(rows[None], (turned.T @ left / sizes)[None], 2.0, scaled)
+        # Accelerations of feet and of the pelvis differ by orders of magnitude, and every force moves all of them: as
+        # equations of the generalized forces that the tasks take, the least of reserves counts, beside full muscles.
+        mass = np.linalg.pinv(lightness[np.ix_(counted, counted)], RANK, hermitian=True)
+        rows = np.ascontiguousarray((mass @ (each * scale)).T)
+        result, _, solved = least_effort(rows[None], (mass @ left)[None], 2.0, scaled)
         forces[able] = result[0] * scale
         lacking = left - each @ forces[able]
         if solved[0] and (np.abs(lacking) <= CLOSE * (np.abs(each) @ np.abs(forces[able]))).all():

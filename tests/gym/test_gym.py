@@ -12,7 +12,10 @@ from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 import osimlite  # noqa: E402
 from osimlite.errors import OsimliteError  # noqa: E402
+from osimlite.gym.environments import MuscleEnv, MuscleVectorEnv  # noqa: E402
 from osimlite.gym.tasks import TASKS  # noqa: E402
+from osimlite.records import replace  # noqa: E402
+from osimlite.simulation.integrators import INTEGRATORS  # noqa: E402
 
 NAMES = [f"osimlite/{name}" for name in TASKS]
 
@@ -26,26 +29,51 @@ def test_gymnasium_finds_nothing_wrong(name: str) -> None:
     env.close()
 
 
-@pytest.mark.parametrize(("name", "count"), [("osimlite/Arm-v0", 64), ("osimlite/Walk2D-v0", 6)])
-def test_copies_are_single_environments_bit_for_bit(name: str, count: int) -> None:
-    many = gymnasium.make_vec(name, num_envs=count)
+@pytest.mark.parametrize(
+    ("name", "count", "integrator"),
+    [("Arm-v0", 64, "merson"), ("Walk2D-v0", 6, "merson"), *(("Arm-v0", 5, name) for name in INTEGRATORS)],
+)
+def test_copies_are_single_environments_bit_for_bit(name: str, count: int, integrator: str) -> None:
+    """Through episodes that end and begin anew, beside another environment of the same model."""
+    task = replace(TASKS[name](), integrator=integrator, seconds=0.2)
+    many, another, one = MuscleVectorEnv(count, task), MuscleVectorEnv(2, task), MuscleEnv(task)
     rng = np.random.default_rng(0)
-    actions = [
-        many.action_space.sample() * 0 + rng.random(many.action_space.shape).astype(np.float32) for _ in range(12)
-    ]
+    actions = [rng.random(many.action_space.shape, dtype=np.float32) for _ in range(45)]
     first, _ = many.reset(seed=5)
-    found = [many.step(action) for action in actions]
-    for k in (0, 1, count - 1):
-        one = gymnasium.make(name).unwrapped
+    another.reset(seed=1)
+    found = []
+    for action in actions:
+        found.append(many.step(action)[:4])
+        another.step(action[:2])
+    for k in range(count):
         observation, _ = one.reset(seed=5 + k)
         assert np.array_equal(observation, first[k])
-        for action, (observations, rewards, over, _, _) in zip(actions, found, strict=True):
-            observation, reward, is_over, _, _ = one.step(action[k])
-            assert np.array_equal(observation, observations[k]) and reward == rewards[k] and is_over == over[k]
+        is_over = False
+        for action, (observations, rewards, over, late) in zip(actions, found, strict=True):
             if is_over:
-                break
-        one.close()
-    many.close()
+                observation, reward, ended = one.reset()[0], 0.0, (False, False)
+            else:
+                observation, reward, *ended, _ = one.step(action[k])
+            assert np.array_equal(observation, observations[k]) and reward == rewards[k]
+            assert (over[k], late[k]) == tuple(ended)
+            is_over = any(ended)
+    for env in (many, another, one):
+        env.close()
+
+
+def test_steps_go_by_the_integrator_of_the_task() -> None:
+    """The same motion, but for the error of the methods."""
+    ends = {}
+    for name in INTEGRATORS:
+        env = MuscleEnv(replace(TASKS["Arm-v0"](), integrator=name, accuracy=1e-6))
+        env.reset(seed=3)
+        for number in range(30):
+            observation, *_ = env.step(np.array([0.3, 0.1 * (number % 3)], dtype=np.float32))
+        ends[name] = observation
+        env.close()
+    merson = ends.pop("merson")
+    for other in ends.values():
+        assert 0.0 < np.abs(other - merson).max() < 1e-3
 
 
 def test_copies_begin_anew_after_their_episodes() -> None:

@@ -309,7 +309,7 @@ def way(sizes: Ints, numbers: Floats, wanted: Floats, step: Floats, push: Floats
                 rise -= change[j] * answer(numbers, n, j, room, y[j] + part * change[j])
         if part == 0.0:
             start, part = rise, 1.0
-        elif abs(rise) <= 0.5 * abs(start) or (part == 1.0 and rise > 0.0):
+        elif abs(rise) <= 0.1 * abs(start) or (part == 1.0 and rise > 0.0):
             break
         else:
             if rise > 0.0:
