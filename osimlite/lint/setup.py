@@ -258,20 +258,22 @@ class Setup(Subject):
         """The other setup of the project that writes a file, which need not be there yet; None if none does."""
         wanted = os.path.realpath(path)
         around = self._tools_in(list(Path(wanted).parents)[:3])
+        named: dict[int, str] = {}
         for file, top in dict(self.neighbours + around).items():
             if self.file is not None and os.path.realpath(file) == os.path.realpath(self.file):
                 continue
             folder = os.path.dirname(file)
             results = getattr(top, "results_directory", "") or "."
             within = os.path.realpath(os.path.join(folder, results))
-            # Tools that run through time call their results by their own name.
-            if os.path.dirname(wanted) == within and os.path.basename(wanted).startswith(f"{top.name}_"):
-                return file
+            # Tools that run through time call their tables by their own name, which may begin with that of another.
+            is_own = os.path.dirname(wanted) == within and os.path.basename(wanted).startswith(f"{top.name}_")
+            if is_own and not wanted.endswith(".osim"):
+                named[len(top.name)] = file
             for item in top.walk():
                 for _, name in files_of(item, "output-file"):
                     if wanted in (os.path.realpath(os.path.join(place, name)) for place in (folder, within)):
                         return file
-        return None
+        return named[max(named)] if named else None
 
 
 def is_given(name: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,16 @@ def problem(random: Generator, m: int, n: int, frames: int = 1) -> tuple[Array, 
     high[1::4] = 1.0
     within = random.uniform(np.maximum(low, -1.0), np.minimum(high, 1.0), size=(frames, n))
     return columns, np.einsum("tnm,tn->tm", columns, within), low, high
+
+
+def test_weak_ones_give_what_full_ones_leave() -> None:
+    """Reserves of 1 N m beside muscles that can change their force by little: a window of CMC in a public walk."""
+    with np.load(Path(__file__).with_name("full_muscles.npz")) as given:
+        columns, wanted, (low, high) = given["columns"], given["wanted"], given["bounds"]
+    (x,), _, (is_solved,) = solved(columns[None], wanted[None], low, high)
+    assert is_solved
+    assert np.max(np.abs(x @ columns - wanted) / (np.abs(x) @ np.abs(columns))) < 1e-10
+    assert x @ x == pytest.approx(648.4029065353637, rel=1e-9)  # found in a prototype by another search
 
 
 def test_the_quadratic_problem() -> None:
