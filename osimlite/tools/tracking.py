@@ -161,6 +161,9 @@ class Tasks:
             if type(item) is not CMC_Joint:
                 message = f"the task '{item.name}' is a {type(item).__name__}, which cannot be followed yet"
                 raise NotRunnable(message, file=str(path))
+            for tag in ("active", "weight", "kp", "kv", "ka"):
+                if not getattr(item, tag):
+                    raise job.error(f"the task '{item.name}' of '{path}' has an empty '{tag}'; give it a value")
             # As in OpenSim, `on` means nothing.
             if not item.active[0]:
                 continue

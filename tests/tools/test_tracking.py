@@ -112,6 +112,7 @@ def test_who_is_too_weak_is_told(folder: Path) -> None:
     [
         ({"name": "angel"}, "has no coordinate 'angel'"),
         ({"active": "false true true"}, "no task of .* is active"),
+        ({"active": ""}, "has an empty 'active'"),
         ({"final": 0.0005}, "give a later final_time"),
         ({"more": "<adjust_com_to_reduce_residuals>true</adjust_com_to_reduce_residuals>"}, "adjusted_com_body"),
         ({"tool": "CMCTool", "more": "<actuators_to_exclude>motor</actuators_to_exclude>"}, "actuators_to_exclude"),
