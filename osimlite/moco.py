@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 from osimlite._lazy import imported_when_used
 
 if TYPE_CHECKING:
+    from osimlite.optimal.inverse import inverse as inverse
+    from osimlite.optimal.inverse import problem_of_inverse as problem_of_inverse
     from osimlite.optimal.ipopt import Progress as Progress
     from osimlite.optimal.ipopt import Violation as Violation
     from osimlite.optimal.solution import MocoSolution as MocoSolution
@@ -26,6 +28,8 @@ _MODULES = {
     "MocoTrajectory": "osimlite.optimal.trajectory",
     "Progress": "osimlite.optimal.ipopt",
     "Violation": "osimlite.optimal.ipopt",
+    "inverse": "osimlite.optimal.inverse",
+    "problem_of_inverse": "osimlite.optimal.inverse",
     "evaluated": "osimlite.optimal.solution",
     "problem_of": "osimlite.optimal.solution",
     "problem_of_track": "osimlite.optimal.track",

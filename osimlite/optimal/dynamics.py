@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 from osimlite.backends.symbols import casadi
 from osimlite.optimal.point import Formula, Point
@@ -26,8 +27,17 @@ class Dynamics:
         self.problem, self.functions = problem, problem.functions
         self.is_implicit = problem.solver.multibody_dynamics_mode == "implicit"
         self.size = len(self.functions.coordinates)
-        self.tendons = ImplicitTendons(problem)
+        self.tendons = ImplicitTendons(problem, self.elements())
         self._first_rate = self.size if self.is_implicit else 0
+
+    def elements(self) -> Iterable[tuple[str, Any]]:
+        """The forces of the model, by their paths."""
+        return [(item.path, item) for item in self.functions.forces.elements]
+
+    def path_lengths(self, point: Point) -> tuple[Formula, Formula]:
+        """Lengths and lengthening speeds of the paths of ``functions.path_names``."""
+        lengths, speeds, _ = self.functions.paths(point.t, point.x, point.p)
+        return lengths, speeds
 
     def rates(self, point: Point) -> Formula:
         """The derivative of the whole state."""

@@ -14,11 +14,12 @@ import numpy as np
 
 from osimlite._load import module_name
 from osimlite.backends.functions import casadi as functions_of
-from osimlite.errors import DocumentError, UnsupportedError
 from osimlite.modifying.processing import processed
 from osimlite.multibody.spatial import Array
+from osimlite.optimal.asked import Asked
 from osimlite.optimal.bounds import FREE, Range, control_bounds, range_of, state_bounds
 from osimlite.optimal.dynamics import Dynamics
+from osimlite.optimal.given_motion import GivenDynamics, GivenMotion, Motion, motion_of
 from osimlite.optimal.point import Formula, Point, Series, Terms, integral
 from osimlite.optimal.schemes import Grid, scheme_named
 from osimlite.schema.base import Component, Object
@@ -28,22 +29,22 @@ from osimlite.schema.moco.goals import MocoControlGoal, MocoGoal
 from osimlite.schema.moco.parts import MocoWeightSet
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoStudy
 from osimlite.schema.model import Model
-from osimlite.simulation.files.storage import StoTable, beside
-from osimlite.text import did_you_mean
+from osimlite.schema.motions import PositionMotion
+from osimlite.simulation.files.storage import StoTable
 
 NO_RATES = "BallJoint", "EllipsoidJoint", "FreeJoint", "ScapulothoracicJoint"
 """Joints whose speeds are not the rates of their values: Moco refuses them."""
 
 
-class Problem:
+class Problem(Asked):
     """What varies, between which bounds, and what is asked of it.
 
     Args:
         study: as it was read or made.
         file: it stands in, for messages and for the files that it names.
         folder: that those files are in, if the study is in none; the current folder if None.
-
         tables: by names of goals, in the place of those that their references name.
+        motion: that is given exactly, as if the model had a PositionMotion.
 
     Attributes:
         study: as given; `phase` and `solver` are its parts.
@@ -68,20 +69,22 @@ class Problem:
         file: str | Path | None = None,
         folder: Path | None = None,
         tables: Mapping[str, StoTable] | None = None,
+        motion: Motion | None = None,
     ) -> None:
+        super().__init__(file, folder)
         self.tables = tables or {}
-        self.study, self.file = study, None if file is None else Path(file)
-        self.folder = self.file.parent if self.file is not None else folder or Path(".")
+        self.study = study
         self.phase = study.problem.phases
         self.series: list[Series] = []
         if not isinstance(study.solver, MocoCasADiSolver):
             raise self.refused(study.solver, "of solvers only MocoCasADiSolver is known")
         self.solver: MocoCasADiSolver = study.solver
         self.model = self._model()
+        motion = motion or self._motion()
         self.components = {part.path: part for part in self.model.walk() if isinstance(part, Component)}
         self._refuse_parts()
         paths = {parameter.name: self._parameter_paths(parameter) for parameter in self.phase.parameters}
-        self.functions = functions_of(self.model, [path for own in paths.values() for path in own], self.folder)
+        self.functions: Any = self._functions([path for own in paths.values() for path in own], motion)
         self.parameters: dict[str, Range] = {
             parameter.name: range_of(parameter.moco_bounds) or FREE for parameter in self.phase.parameters
         }
@@ -94,7 +97,7 @@ class Problem:
         )
         self.constraint_names = self._constraint_names()
         self.grid = Grid.of(scheme_named(self.solver.transcription_scheme), self._mesh())
-        self.dynamics = Dynamics(self)
+        self.dynamics = Dynamics(self) if motion is None else GivenDynamics(self)
         self._refuse_settings()
         self.goals: list[tuple[MocoGoal, Terms]] = [
             *((goal, self._terms(goal)) for goal in self.phase.goals if goal.enabled),
@@ -102,45 +105,6 @@ class Problem:
         ]
         for constraint in self.phase.path_constraints:
             raise self.refused(constraint, "path constraints are not solved here yet")
-
-    # ------------------------------------------------------------------------------------------------- errors
-    def place(self, name: str) -> Path:
-        """Where a file is that the study names: looked for from its folder, then from the current one."""
-        return beside(self.folder, name.strip())
-
-    def _placed(self, part: Object) -> dict[str, Any]:
-        """Where a part of the study stands: objects know no lines, but their tags and names are in the text."""
-        if self.file is None:
-            return {}
-        tags = re.compile(rf"<{re.escape(type(part).tag)}(\s[^>]*)?/?>")
-        named = re.compile(rf'name="{re.escape(part.name)}"')
-        try:
-            lines = self.file.read_text(encoding="utf-8").splitlines()
-        except (OSError, UnicodeError):
-            return {"file": str(self.file)}
-        found = [(number, text) for number, text in enumerate(lines, 1) if tags.search(text)]
-        found = [pair for pair in found if named.search(pair[1])] or found
-        return {"file": str(self.file), "line": found[0][0] if found else None}
-
-    def refused(self, part: Object, reason: str) -> UnsupportedError:
-        """The error of what is not solved here."""
-        name = f" '{part.name}'" if part.name else ""
-        return UnsupportedError(f"{type(part).tag}{name}: {reason}", **self._placed(part))
-
-    def wrong(self, part: Object, reason: str) -> DocumentError:
-        """The error of what cannot be."""
-        name = f" '{part.name}'" if part.name else ""
-        return DocumentError(f"{type(part).tag}{name}: {reason}", **self._placed(part))
-
-    def expect(self, part: Object, name: str, known: Iterable[str], what: str) -> None:
-        """Refuse a name that is none, with the nearest one that is.
-
-        Raises:
-            DocumentError: it is none.
-        """
-        known = [*known]
-        if name not in known:
-            raise self.wrong(part, f"the model has no {what} '{name}'{did_you_mean(name, known)}")
 
     # --------------------------------------------------------------------------------------- for goals and tools
     def weights(
@@ -173,6 +137,25 @@ class Problem:
             raise self.wrong(processor, "it has no model and names none")
         return processed(processor, self.folder)
 
+    def _motion(self) -> Motion | None:
+        """That of a PositionMotion, which is taken out of the model."""
+        for part in list(self.model.components(PositionMotion)):
+            if part.default_enabled:
+                place = part.path
+                motion = motion_of(part, self.model)
+                self.model.remove(part)
+                if isinstance(motion, str):
+                    raise self.wrong(self.phase, f"PositionMotion '{place}' has no function for '{motion}'")
+                return motion
+        return None
+
+    def _functions(self, parameters: list[str], motion: Motion | None) -> Any:
+        if motion is None:
+            return functions_of(self.model, parameters, self.folder)
+        if parameters:
+            raise self.refused(self.phase, f"parameters ({parameters[0]}) where the motion is given")
+        return GivenMotion(self.model, motion, self.folder)
+
     def _refuse_parts(self) -> None:
         for part in self.components.values():
             if isinstance(part, Coordinate) and part.locked:
@@ -183,8 +166,6 @@ class Problem:
             if type(part).tag in NO_RATES:
                 message = f"{type(part).tag} '{part.path}' has speeds that are no rates, which Moco refuses, too"
                 raise self.wrong(self.phase, f"{message}; take a CustomJoint")
-            if type(part).tag == "PositionMotion":
-                raise self.refused(self.phase, f"a motion that is given (PositionMotion '{part.path}')")
 
     def _refuse_settings(self) -> None:
         if self.solver.scale_variables_using_bounds:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from osimlite.errors import DocumentError
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.smoothing_spline import SampledCurves
 from osimlite.multibody.spatial import Array
+from osimlite.optimal.asked import Asked
 from osimlite.optimal.layout import FEWEST
 from osimlite.optimal.point import Series
 from osimlite.records import replace
@@ -37,11 +39,15 @@ def table_of(problem: Problem, part: Object, processor: TableProcessor) -> StoTa
         OsimliteError: the file cannot be read.
     """
     given = problem.tables.get(part.name)
-    return given if given is not None else processed_table(problem, part, processor)
+    if given is not None:
+        return given
+    return processed_table(problem, part, processor, problem.functions.states, problem.functions.mechanism)
 
 
-def processed_table(problem: Problem, part: Object, processor: TableProcessor) -> StoTable:
-    """The table as its processor makes it; errors as of :func:`table_of`."""
+def processed_table(
+    problem: Asked, part: Object, processor: TableProcessor, states: Sequence[str], mechanism: Mechanism
+) -> StoTable:
+    """The table as its processor makes it, given the paths of states; errors as of :func:`table_of`."""
     if not processor.filepath.strip():
         raise problem.wrong(part, "it names no table")
     table = read_sto(problem.place(processor.filepath))
@@ -49,10 +55,10 @@ def processed_table(problem: Problem, part: Object, processor: TableProcessor) -
         if isinstance(operator, TabOpLowPassFilter):
             table = _filtered(table, operator)
         elif isinstance(operator, TabOpUseAbsoluteStateNames):
-            table = replace(table, columns=tuple(_absolute(name, problem.functions.states) for name in table.columns))
+            table = replace(table, columns=tuple(_absolute(name, states) for name in table.columns))
         else:
             raise problem.refused(operator, "this operator on tables is not applied here")
-    return replace(_in_radians(table, problem.functions.mechanism), header={"inDegrees": "no"})
+    return replace(_in_radians(table, mechanism), header={"inDegrees": "no"})
 
 
 def _filtered(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
@@ -73,7 +79,7 @@ def _filtered(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
     return replace(table, times=times, rows=rows)
 
 
-def _absolute(label: str, states: tuple[str, ...]) -> str:
+def _absolute(label: str, states: Sequence[str]) -> str:
     """The path of the state that an old label means; the label itself if it means none."""
     ending = f"{label[:-2]}/speed" if label.endswith("_u") else label.replace(".", "/")
     for end in (label, ending, f"{ending}/value", re.sub(r"^.*/(?=[^/]+/[^/]+$)", "", label)):
@@ -97,6 +103,17 @@ def splines(problem: Problem, table: StoTable, columns: list[str]) -> list[Serie
     Raises:
         DocumentError: a column is not there, has gaps, or is too short.
     """
+    expect_columns(table, columns)
+    curves = Curves(table.times, np.column_stack([table.times, *(table[name] for name in columns)])[:, 1:])
+    return [problem.given(partial(_column, curves, k)) for k in range(len(columns))]
+
+
+def expect_columns(table: StoTable, columns: Sequence[str]) -> None:
+    """Refuse a table through whose columns no splines can go.
+
+    Raises:
+        DocumentError: as of :func:`splines`.
+    """
     if len(table.times) < FEWEST:
         message = f"it has {len(table.times)} times; splines of fifth degree take {FEWEST} at least"
         raise DocumentError(message, file=table.file)
@@ -105,8 +122,6 @@ def splines(problem: Problem, table: StoTable, columns: list[str]) -> list[Serie
             raise DocumentError(f"there is no column '{name}'", file=table.file)
         if not np.isfinite(table[name]).all():
             raise DocumentError(f"column '{name}' has gaps; fill them", file=table.file)
-    curves = Curves(table.times, np.column_stack([table.times, *(table[name] for name in columns)])[:, 1:])
-    return [problem.given(partial(_column, curves, k)) for k in range(len(columns))]
 
 
 def _column(curves: Curves, number: int, times: Array) -> Array:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 from osimlite.backends.symbolic import on_symbols
 from osimlite.backends.symbols import casadi
@@ -18,23 +19,27 @@ if TYPE_CHECKING:
 class ImplicitTendons:
     """The muscles of De Groote and Fregly whose ``tendon_compliance_dynamics_mode`` is implicit.
 
+    Args:
+        problem: that they are part of.
+        elements: forces of the model, by their paths.
+
     Attributes:
         paths: of the muscles.
         names: of the rates, as Moco has them.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, elements: Iterable[tuple[str, Any]]) -> None:
         self.problem = problem
         self.muscles: list[tuple[str, SmoothMuscle, SmoothTendon]] = []
-        for element in problem.functions.forces.elements:
-            part = problem.components.get(element.path)
+        for path, element in elements:
+            part = problem.components.get(path)
             if (
                 isinstance(part, DeGrooteFregly2016Muscle)
                 and part.tendon_compliance_dynamics_mode == "implicit"
                 and not part.ignore_tendon_compliance
             ):
-                values = {type(each): each for each in element.values}  # type: ignore[attr-defined]
-                self.muscles.append((element.path, values[SmoothMuscle], values[SmoothTendon]))
+                values = {type(each): each for each in element.values}
+                self.muscles.append((path, values[SmoothMuscle], values[SmoothTendon]))
         self.paths = [path for path, _, _ in self.muscles]
         self.names = [f"{path}/implicitderiv_normalized_tendon_force" for path in self.paths]
 
@@ -46,7 +51,7 @@ class ImplicitTendons:
         if not self.muscles:
             return [], casadi.SX(0, 1)
         functions, rows = self.problem.functions, []
-        lengths, speeds, _ = functions.paths(point.t, point.x, point.p)
+        lengths, speeds = self.problem.dynamics.path_lengths(point)
         residual = on_symbols(degroote_residual)
         for number, (path, muscle, tendon) in enumerate(self.muscles):
             place = functions.path_names.index(path)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,10 +14,11 @@ from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
 from osimlite.optimal.solution import MocoSolution, solved
 from osimlite.optimal.tables import processed_table
+from osimlite.optimal.times import set_times
 from osimlite.optimal.trajectory import MocoTrajectory
 from osimlite.records import replace
 from osimlite.schema.moco.goals import MocoControlGoal
-from osimlite.schema.moco.parts import MocoFinalBounds, MocoInitialBounds, MocoWeight, MocoWeightSet
+from osimlite.schema.moco.parts import MocoWeight, MocoWeightSet
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoPhase, MocoProblem, MocoStudy, MocoTrack
 from osimlite.schema.moco.tracking import MocoStateTrackingGoal
 from osimlite.schema.tools.processors import ModelProcessor
@@ -61,7 +61,9 @@ def problem_of_track(
         raise bare.refused(tool.markers_reference, "markers are not followed here yet")
     if not tool.states_reference.filepath.strip():
         raise bare.wrong(tool, "it has nothing to follow; give it a states_reference")
-    table = processed_table(bare, tool.states_reference, tool.states_reference)
+    table = processed_table(
+        bare, tool.states_reference, tool.states_reference, bare.functions.states, bare.functions.mechanism
+    )
     if tool.track_reference_position_derivatives:
         table = _with_speeds(table)
     goal = MocoStateTrackingGoal(
@@ -81,12 +83,7 @@ def problem_of_track(
                 control_weights=MocoWeightSet(name="control_weights", objects=weights),
             )
         )
-    first, last = _times(bare, tool, table)
-    solver.num_mesh_intervals = math.ceil((last - first) / tool.mesh_interval)
-    if tool.clip_time_range:
-        first, last = first + 1e-3, last - 1e-3
-    phase.time_initial_bounds = MocoInitialBounds(name="time_initial_bounds", bounds=(first,))
-    phase.time_final_bounds = MocoFinalBounds(name="time_final_bounds", bounds=(last,))
+    first, last = set_times(bare, tool, table, phase, solver)
     if more is not None:
         more(study)
     guess = None
@@ -151,13 +148,3 @@ def _weights(problem: Problem, tool: MocoTrack, table: StoTable) -> list[MocoWei
             if name in table.columns and (name in own or bound):
                 result[name] = own.get(name, 0.0)
     return [MocoWeight(name=name, weight=weight) for name, weight in result.items()]
-
-
-def _times(problem: Problem, tool: MocoTrack, table: StoTable) -> tuple[float, float]:
-    first, last = float(table.times[0]), float(table.times[-1])
-    start = first if tool.initial_time is None else tool.initial_time
-    end = last if tool.final_time is None else tool.final_time
-    if not first <= start < end <= last:
-        message = f"from {start:g} s to {end:g} s there are no data; they are from {first:g} s to {last:g} s"
-        raise problem.wrong(tool, message)
-    return start, end

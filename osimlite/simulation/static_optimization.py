@@ -230,6 +230,30 @@ class StaticOptimization:
         result: Array = shared[..., 0] * self.optimal_forces
         return result
 
+    def balance(self, times: Array, values: Array, speeds: Array, accelerations: Array) -> tuple[Array, Array]:
+        """What the coordinates of `coordinates` need of the actuators (t, m), and what each gives by 1 N (t, m, a).
+
+        The accelerations (t, n) are taken as they are, whether the constraints allow them or not.
+        """
+        system, order = self._system, list(self._system.order)
+        _, ways = self._allowed(times, values, speeds, accelerations)
+        moments = np.column_stack([times, system.state.rows(values, speeds)])
+        needed, pushes, _ = system.pushed(moments, np.ascontiguousarray(accelerations[:, order]), self._paths)
+        turned = ways[:, order]
+        each = pushes / self.optimal_forces[:, None]
+        return (needed[:, None, :] @ turned)[:, 0], (each @ turned).transpose(0, 2, 1)
+
+    def path_lengths(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array]:
+        """Lengths (m) and lengthening speeds (m/s) of the muscles' paths (t, a); 1 and 0 of other actuators."""
+        system = self._system
+        moments = np.column_stack([times, system.state.rows(values, speeds)])
+        result = np.ones((len(times), len(self._paths))), np.zeros((len(times), len(self._paths)))
+        own = [k for k, item in enumerate(self._actuators) if isinstance(item, Muscle)]
+        for rows, name in zip(result, ("length", "rate"), strict=True):
+            places = [place for k in own for place in system.places_of(self._paths[k], (name,))]
+            rows[:, own] = system.looked(moments, places)
+        return result
+
     def responses(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array, Array]:
         """Accelerations of all coordinates in one pose.
 

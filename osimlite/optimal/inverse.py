@@ -1,0 +1,124 @@
+"""MocoInverse: what muscles do in a motion that is given exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.modifying.processing import processed
+from osimlite.multibody import build_mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.optimal.asked import Asked
+from osimlite.optimal.given_motion import GivenMotion
+from osimlite.optimal.ipopt import Progress
+from osimlite.optimal.problem import Problem
+from osimlite.optimal.program import Program
+from osimlite.optimal.solution import MocoSolution, solved
+from osimlite.optimal.tables import Curves, expect_columns, processed_table
+from osimlite.optimal.times import set_times
+from osimlite.records import replace
+from osimlite.schema.moco.goals import MocoControlGoal, MocoInitialActivationGoal, MocoSumSquaredStateGoal
+from osimlite.schema.moco.parts import MocoWeight, MocoWeightSet
+from osimlite.schema.moco.studies import MocoCasADiSolver, MocoInverse, MocoPhase, MocoProblem, MocoStudy
+from osimlite.schema.model import Model
+from osimlite.schema.tools.processors import ModelProcessor
+from osimlite.simulation.files.storage import StoTable
+
+AUXILIARY_WEIGHT = 0.01
+"""Of the squares of rates of tendon forces."""
+
+
+def problem_of_inverse(
+    tool: MocoInverse,
+    file: Path | None = None,
+    folder: Path | None = None,
+    more: Callable[[MocoStudy], None] | None = None,
+) -> Problem:
+    """The problem that the tool makes.
+
+    Args:
+        tool: its settings.
+        file: they stand in.
+        folder: that their files are in, if they are in none.
+        more: changes the study before it becomes a problem: goals, bounds, settings of the solver.
+
+    Raises:
+        OsimliteError: the settings or their files are not as they have to be.
+    """
+    asked = Asked(file, folder)
+    model = processed(tool.model, asked.folder)
+    solver = MocoCasADiSolver(
+        name="solver",
+        multibody_dynamics_mode="implicit",
+        interpolate_control_mesh_interior_points=False,
+        minimize_implicit_auxiliary_derivatives=True,
+        implicit_auxiliary_derivatives_weight=AUXILIARY_WEIGHT,
+        optim_convergence_tolerance=tool.convergence_tolerance,
+        optim_constraint_tolerance=tool.constraint_tolerance,
+        optim_sparsity_detection="random",
+        optim_finite_difference_scheme="forward",
+    )
+    if tool.max_iterations is not None:
+        solver.optim_max_iterations = tool.max_iterations
+    phase = MocoPhase(name="phases", model=ModelProcessor(name="model", model=model))
+    study = MocoStudy(name=tool.name, problem=MocoProblem(name="problem", phases=phase), solver=solver)
+    reserves = MocoWeight(name=".*/reserve_.*", weight=tool.reserves_weight)
+    effort = MocoControlGoal(name="excitation_effort")
+    effort.control_weights_pattern = MocoWeightSet(name="control_weights_pattern", objects=[reserves])
+    phase.goals += [effort, MocoInitialActivationGoal(name="initial_activation")]
+    if tool.minimize_sum_squared_activations:
+        phase.goals.append(MocoSumSquaredStateGoal(name="activation_effort", pattern=".*activation$"))
+    table, motion = _kinematics(asked, tool, model)
+    set_times(asked, tool, table, phase, solver)
+    if more is not None:
+        more(study)
+    return Problem(study, file, folder, motion=motion)
+
+
+def inverse(
+    tool: MocoInverse,
+    *,
+    folder: str | Path | None = None,
+    more: Callable[[MocoStudy], None] | None = None,
+    tell: Callable[[Progress], None] | None = None,
+) -> MocoSolution:
+    """Find what muscles do in a motion that is given, as OpenSim's MocoInverse.
+
+    Args:
+        tool: its settings.
+        folder: that their files are in; the current folder if None.
+        more: changes the study before it is solved: goals, bounds, settings of the solver.
+        tell: is told of each iteration.
+
+    Raises:
+        OsimliteError: as of :func:`problem_of_inverse`.
+    """
+    return solved(Program(problem_of_inverse(tool, None, None if folder is None else Path(folder), more)), None, tell)
+
+
+def with_motion(problem: Problem, solution: MocoSolution) -> MocoSolution:
+    """A solution with the values and speeds of the motion that was given."""
+    given: GivenMotion = problem.functions
+    trajectory = solution.trajectory
+    states = given.inserted(trajectory.times)
+    names = trajectory.names | {"states": (*states, *trajectory.names["states"])}
+    return replace(solution, trajectory=replace(trajectory, columns=states | trajectory.columns, names=names))
+
+
+def _kinematics(asked: Asked, tool: MocoInverse, model: Model) -> tuple[StoTable, Callable[[Array], Array]]:
+    """The table of a tool, and the motion of all coordinates through its poses, which fulfil the constraints."""
+    mechanism = build_mechanism(model)
+    infos = mechanism.coordinates
+    names = [f"{info.path}/value" for info in infos]
+    states = [*names, *(f"{info.path}/speed" for info in infos)]
+    table = processed_table(asked, tool.kinematics, tool.kinematics, states, mechanism)
+    own = [name for name in names if name in table.columns]
+    if not own:
+        raise asked.wrong(tool, "its kinematics have no column such as " + (names[0] if names else "a coordinate"))
+    expect_columns(table, own)
+    values = np.tile([info.default_value for info in infos], (len(table.times), 1))
+    values[:, [names.index(name) for name in own]] = np.column_stack([table[name] for name in own])
+    poses = np.array([mechanism.assemble(q, t) for t, q in zip(table.times.tolist(), values, strict=True)])
+    return table, Curves(table.times, poses).at

@@ -1,0 +1,32 @@
+"""When the motions of Moco's tools begin and end."""
+
+from __future__ import annotations
+
+import math
+
+from osimlite.optimal.asked import Asked
+from osimlite.schema.moco.parts import MocoFinalBounds, MocoInitialBounds
+from osimlite.schema.moco.studies import MocoCasADiSolver, MocoInverse, MocoPhase, MocoTrack
+from osimlite.simulation.files.storage import StoTable
+
+
+def set_times(
+    asked: Asked, tool: MocoInverse | MocoTrack, table: StoTable, phase: MocoPhase, solver: MocoCasADiSolver
+) -> tuple[float, float]:
+    """Set bounds of time and the mesh by the settings of a tool, and return the first and the last time, s.
+
+    Raises:
+        DocumentError: the table has no data between the times of the tool.
+    """
+    first, last = float(table.times[0]), float(table.times[-1])
+    start = first if tool.initial_time is None else tool.initial_time
+    end = last if tool.final_time is None else tool.final_time
+    if not first <= start < end <= last:
+        message = f"from {start:g} s to {end:g} s there are no data; they are from {first:g} s to {last:g} s"
+        raise asked.wrong(tool, message)
+    solver.num_mesh_intervals = math.ceil((end - start) / tool.mesh_interval)
+    if tool.clip_time_range:
+        start, end = start + 1e-3, end - 1e-3
+    phase.time_initial_bounds = MocoInitialBounds(name="time_initial_bounds", bounds=(start,))
+    phase.time_final_bounds = MocoFinalBounds(name="time_final_bounds", bounds=(end,))
+    return start, end

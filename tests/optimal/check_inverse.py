@@ -1,0 +1,100 @@
+"""Motions that are given: what muscles do in a squat, beside Moco's MocoInverse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.errors import OsimliteError
+from osimlite.moco import MocoTrajectory, evaluated, inverse, problem_of_inverse, solve
+from osimlite.optimal.program import Program
+from tests.optimal.studies import moco_found, moco_said, study, study_file
+
+NAME = "squat_inverse-20"
+
+
+def squat(folder, **choices):
+    """The tool, of whose study the file has six digits of the motion alone."""
+    model = study(folder, NAME).problem.phases.model.model.copy_deep()
+    for motion in list(model.components(osimlite.PositionMotion)):
+        model.remove(motion)
+    moco_found(folder, "squat-25")
+    kinematics = osimlite.TableProcessor(
+        filepath="squat-25.sto", operators=[osimlite.TabOpLowPassFilter(cutoff_frequency=6.0)]
+    )
+    settings = {
+        "initial_time": 0.0,
+        "final_time": 1.0,
+        "mesh_interval": 0.05,
+        "convergence_tolerance": 1e-4,
+        "constraint_tolerance": 1e-4,
+        "kinematics_allow_extra_columns": True,
+        "minimize_sum_squared_activations": True,
+    }
+    return osimlite.MocoInverse(
+        name="squat",
+        model=osimlite.ModelProcessor(model=model),
+        kinematics=kinematics,
+        **(settings | choices),
+    )
+
+
+def test_moco_s_solution_is_one_here(tmp_path):
+    program = Program(problem_of_inverse(squat(tmp_path), folder=tmp_path))
+    terms, missed = evaluated(program, MocoTrajectory.read(moco_found(tmp_path, NAME)))
+    assert terms == pytest.approx(moco_said(NAME)["terms"], rel=1e-9)
+    # N m, of some hundreds: OpenSim's poses fulfil the constraint of the patella to 1e-9 or so.
+    assert missed[0].size < 1e-3
+
+
+def test_ours_costs_no_more(tmp_path):
+    found = inverse(squat(tmp_path), folder=tmp_path)
+    assert found.success
+    assert found.objective <= moco_said(NAME)["objective"] * (1.0 + 1e-4)
+    assert found.iterations < moco_said(NAME)["iterations"]
+
+
+def test_setups_are_run_and_tell_the_motion_too(tmp_path):
+    osimlite.write(squat(tmp_path, mesh_interval=0.2), tmp_path / "setup.xml")
+    outcome = osimlite.run(tmp_path / "setup.xml")
+    assert outcome.done
+    table = outcome.tables["squat_solution.sto"]
+    assert {"/jointset/hip_r/hip_flexion_r/value", "/jointset/hip_r/hip_flexion_r/speed"} <= {*table.columns}
+    speed = np.gradient(table["/jointset/hip_r/hip_flexion_r/value"], table.times)
+    assert np.abs(speed - table["/jointset/hip_r/hip_flexion_r/speed"])[2:-2].max() < 0.3
+
+
+def test_a_study_with_a_motion(tmp_path):
+    found = solve(study_file(tmp_path, NAME))
+    assert found.success
+    # Its motion has six digits, and accelerations of it fewer.
+    assert found.objective == pytest.approx(moco_said(NAME)["objective"], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda phase: setattr(phase, "time_final_bounds", osimlite.MocoFinalBounds(bounds=(0.9, 1.1))), "be fixed"),
+        (
+            lambda phase: phase.parameters.append(
+                osimlite.MocoParameter(component_paths=("/bodyset/torso",), property_name="mass")
+            ),
+            "parameters",
+        ),
+        (lambda phase: phase.goals.append(osimlite.MocoAverageSpeedGoal(name="speed")), "where the motion is given"),
+    ],
+)
+def test_what_a_given_motion_excludes(change, words, tmp_path):
+    made = study(tmp_path, NAME)
+    change(made.problem.phases)
+    with pytest.raises(OsimliteError, match=words):
+        Program(osimlite.moco.problem_of(made, tmp_path))
+
+
+def test_a_motion_without_a_coordinate(tmp_path):
+    made = study(tmp_path, NAME)
+    (motion,) = made.problem.phases.model.model.components(osimlite.PositionMotion)
+    motion.functions.objects.pop()
+    with pytest.raises(OsimliteError, match="has no function for '/jointset/"):
+        osimlite.moco.problem_of(made, tmp_path)
