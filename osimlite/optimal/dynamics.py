@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from osimlite.backends.symbols import casadi
 from osimlite.optimal.point import Formula, Point
-from osimlite.optimal.tendons import ImplicitTendons
+from osimlite.optimal.tendons import Tendons
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
@@ -27,7 +27,7 @@ class Dynamics:
         self.problem, self.functions = problem, problem.functions
         self.is_implicit = problem.solver.multibody_dynamics_mode == "implicit"
         self.size = len(self.functions.coordinates)
-        self.tendons = ImplicitTendons(problem, self.elements())
+        self.tendons = Tendons(problem, self.elements())
         self._first_rate = self.size if self.is_implicit else 0
 
     def elements(self) -> Iterable[tuple[str, Any]]:

@@ -21,6 +21,7 @@ from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.spatial import Array
 from osimlite.optimal.dynamics import Dynamics
 from osimlite.optimal.point import Formula, Point
+from osimlite.optimal.tables import over_time
 from osimlite.schema.actuators import ActivationCoordinateActuator, Actuator, CoordinateActuator
 from osimlite.schema.frames import Body
 from osimlite.schema.joints import SliderJoint
@@ -48,10 +49,10 @@ def motion_of(part: PositionMotion, model: Model) -> Motion | str:
     missing = next((path for path in paths if path not in functions), None)
     if missing is not None:
         return missing
-    own: list[Any] = [numeric(functions[path], 1, f"the function of '{path}'") for path in paths]
+    own = [numeric(functions[path], 1, f"the function of '{path}'") for path in paths]
 
     def motion(times: Array) -> Array:
-        return np.array([[item.derivatives(t) for item in own] for t in times.tolist()]).transpose(2, 0, 1)
+        return np.stack([over_time(item, times) for item in own], axis=2)
 
     return motion
 
@@ -213,7 +214,7 @@ def bench_of(actuators: Sequence[Any], names: Sequence[str]) -> Model:
         slider.coordinates[0].name, slider.coordinates[0].default_value = name, 1.0
         model.add(slider)
         if isinstance(item, Muscle):
-            own = item.copy_deep()
+            own: Any = item.copy_deep()
             own.geometry_path = GeometryPath(name="path")
             for end, frame in enumerate(("/ground", f"/bodyset/{name}")):
                 own.geometry_path.path_point_set.objects.append(PathPoint(name=f"p{end}", socket_parent_frame=frame))

@@ -58,7 +58,8 @@ class Layout:
             "slacks": [Bounds.of(correction)] * len(problem.slack_names),
         }
         self.shared = 2 + len(problem.parameters)
-        lower, upper = [*zip(*problem.times, *problem.parameters.values(), strict=True)]
+        ranges = [*problem.times, *problem.parameters.values()]
+        lower, upper = ([each[k] for each in ranges] for k in range(2))
         self.places: list[Any] = []
         self.places_of = {kind: np.full((len(grid.places), len(self.names[kind])), -1) for kind in KINDS}
         lows, highs, size, end = [*lower], [*upper], self.shared, len(grid.places) - 1

@@ -137,6 +137,21 @@ class Terms:
     modes: tuple[str, ...] = COST
 
 
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What a path constraint consists of.
+
+    Attributes:
+        labels: of its values, for messages.
+        formula: at a point, the column of its values.
+        limits: least and greatest of each value.
+    """
+
+    labels: list[str]
+    formula: Callable[[Point], Formula]
+    limits: list[tuple[float, float]]
+
+
 def integral(integrand: Callable[[Point], Formula], modes: tuple[str, ...] = COST) -> Terms:
     """The terms of a goal that is the integral of something over time."""
     return Terms(lambda ends: ends.integral, integrand, modes)

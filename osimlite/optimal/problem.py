@@ -20,7 +20,7 @@ from osimlite.optimal.asked import Asked
 from osimlite.optimal.bounds import FREE, Range, control_bounds, range_of, state_bounds
 from osimlite.optimal.dynamics import Dynamics
 from osimlite.optimal.given_motion import GivenDynamics, GivenMotion, Motion, motion_of
-from osimlite.optimal.point import Formula, Point, Series, Terms, integral
+from osimlite.optimal.point import Formula, Point, Rows, Series, Terms, integral
 from osimlite.optimal.schemes import Grid, scheme_named
 from osimlite.schema.base import Component, Object
 from osimlite.schema.controllers import Controller
@@ -57,6 +57,7 @@ class Problem(Asked):
         constraint_names: of the equations that the model's constraints make, as OpenSim numbers them.
         grid: the points.
         goals: those that count, with what they consist of.
+        path_rows: of the path constraints.
 
     Raises:
         UnsupportedError: there is something that is not solved here; it says where in the file.
@@ -92,8 +93,9 @@ class Problem(Asked):
         self._expect_infos()
         self.controls = control_bounds(self.phase, self.functions.controls, self.components)
         self.states = state_bounds(self.phase, self.functions.states, self.components, self.controls)
-        self.times = tuple(
-            range_of(bounds) or FREE for bounds in (self.phase.time_initial_bounds, self.phase.time_final_bounds)
+        self.times: tuple[Range, Range] = (
+            range_of(self.phase.time_initial_bounds) or FREE,
+            range_of(self.phase.time_final_bounds) or FREE,
         )
         self.constraint_names = self._constraint_names()
         self.grid = Grid.of(scheme_named(self.solver.transcription_scheme), self._mesh())
@@ -103,8 +105,10 @@ class Problem(Asked):
             *((goal, self._terms(goal)) for goal in self.phase.goals if goal.enabled),
             *self._costs_of_solver(),
         ]
-        for constraint in self.phase.path_constraints:
-            raise self.refused(constraint, "path constraints are not solved here yet")
+        self.path_rows: list[Rows] = [
+            self._found(constraint, "constraints", "path constraints").rows(constraint, self)
+            for constraint in self.phase.path_constraints
+        ]
 
     # --------------------------------------------------------------------------------------- for goals and tools
     def weights(
@@ -242,13 +246,18 @@ class Problem(Asked):
             raise self.wrong(solver, "the mesh has to rise from 0 to 1")
         return mesh
 
-    def _terms(self, goal: MocoGoal) -> Terms:
-        place = f"{__package__}.goals.{module_name(type(goal).tag)}"
+    def _found(self, part: Object, package: str, what: str) -> Any:
+        """The module of a class of goals or constraints."""
+        place = f"{__package__}.{package}.{module_name(type(part).tag)}"
         if find_spec(place) is None:
-            raise self.refused(goal, "goals of this class are not solved here yet")
+            raise self.refused(part, f"{what} of this class are not solved here yet")
+        return import_module(place)
+
+    def _terms(self, goal: MocoGoal) -> Terms:
+        module = self._found(goal, "goals", "goals")
         for factor in goal.scale_factors:
             raise self.refused(factor, "scale factors are not found here yet")
-        terms: Terms = import_module(place).terms(goal, self)
+        terms: Terms = module.terms(goal, self)
         if goal.mode is not None and goal.mode not in terms.modes:
             raise self.wrong(goal, f"it cannot be of mode '{goal.mode}', as in Moco; it is a {terms.modes[0]}")
         return terms

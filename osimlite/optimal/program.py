@@ -38,7 +38,13 @@ class PointFunction:
         duration = s[1] - s[0]
         names, residuals = problem.dynamics.residuals(point)
         rows, labels, limits = [residuals], [*names], [(0.0, 0.0)] * len(names)
-        if problem.grid.is_mesh[numbers[0]] and problem.constraint_names:
+        is_mesh = bool(problem.grid.is_mesh[numbers[0]])
+        if is_mesh or problem.solver.enforce_path_constraint_mesh_interior_points:
+            for own in problem.path_rows:
+                rows.append(own.formula(point))
+                labels += own.labels
+                limits += own.limits
+        if is_mesh and problem.constraint_names:
             derived = bool(problem.solver.enforce_constraint_derivatives)
             names, errors = problem.dynamics.constraint_errors(point, derived)
             rows.append(errors)
@@ -90,7 +96,8 @@ class Program:
         self.integrals = [(goal, terms.integrand) for goal, terms in problem.goals if terms.integrand is not None]
         points, is_mesh = range(len(problem.grid.places)), problem.grid.is_mesh
         sorts = [[k for k in points if is_mesh[k]], [k for k in points if not is_mesh[k]]]
-        if not problem.constraint_names:
+        inside = problem.solver.enforce_path_constraint_mesh_interior_points or not problem.path_rows
+        if inside and not problem.constraint_names:
             sorts = [[*points]]
         self.sorts = [PointFunction(self, numbers) for numbers in sorts if numbers]
         self._offsets = np.cumsum([0, *(sort.rows * len(sort.numbers) for sort in self.sorts)])

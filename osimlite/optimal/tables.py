@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from osimlite.errors import DocumentError
+from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.smoothing_spline import SampledCurves
 from osimlite.multibody.spatial import Array
@@ -106,6 +107,12 @@ def splines(problem: Problem, table: StoTable, columns: list[str]) -> list[Serie
     expect_columns(table, columns)
     curves = Curves(table.times, np.column_stack([table.times, *(table[name] for name in columns)])[:, 1:])
     return [problem.given(partial(_column, curves, k)) for k in range(len(columns))]
+
+
+def over_time(function: Function, times: Array) -> Array:
+    """A function of time at times (n,): its value and both derivatives (3, n)."""
+    found = (function.evaluate(np.array([t])) for t in times.tolist())
+    return np.array([(value, slope[0], curve[0, 0]) for value, slope, curve in found]).T
 
 
 def expect_columns(table: StoTable, columns: Sequence[str]) -> None:

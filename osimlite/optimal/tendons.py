@@ -16,26 +16,31 @@ if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
 
 
-class ImplicitTendons:
-    """The muscles of De Groote and Fregly whose ``tendon_compliance_dynamics_mode`` is implicit.
+IMPLICIT, EXPLICIT = "implicit", "explicit"
+"""What ``tendon_compliance_dynamics_mode`` may be."""
+
+
+class Tendons:
+    """The muscles of De Groote and Fregly with elastic tendons of one ``tendon_compliance_dynamics_mode``.
 
     Args:
         problem: that they are part of.
         elements: forces of the model, by their paths.
+        mode: of the muscles.
 
     Attributes:
         paths: of the muscles.
         names: of the rates, as Moco has them.
     """
 
-    def __init__(self, problem: Problem, elements: Iterable[tuple[str, Any]]) -> None:
+    def __init__(self, problem: Problem, elements: Iterable[tuple[str, Any]], mode: str = IMPLICIT) -> None:
         self.problem = problem
         self.muscles: list[tuple[str, SmoothMuscle, SmoothTendon]] = []
         for path, element in elements:
             part = problem.components.get(path)
             if (
                 isinstance(part, DeGrooteFregly2016Muscle)
-                and part.tendon_compliance_dynamics_mode == "implicit"
+                and part.tendon_compliance_dynamics_mode == mode
                 and not part.ignore_tendon_compliance
             ):
                 values = {type(each): each for each in element.values}

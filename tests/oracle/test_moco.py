@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import json
+import os
 import subprocess
 import sys
 from importlib.util import find_spec
 
+import numpy as np
 import pytest
 
+from osimlite.simulation.files.storage import write_sto
+from osimlite.simulation.files.trc import write_trc
+from tests.conftest import ROOT
 from tests.optimal.studies import moco_said, study_file
 
 pytestmark = pytest.mark.skipif(find_spec("casadi") is None, reason="needs the casadi package")
@@ -27,3 +33,57 @@ def test_solutions_are_read(name, tmp_path, repo):
     assert trajectory.getNumTimes() == 101
     assert next(iter(trajectory.getStateNames())) == "/jointset/j0/q0/value"
     assert trajectory.getFinalTime() == pytest.approx(moco_said(name)["final_time"], rel=1e-6)
+
+
+OURS = """
+import json
+from osimlite import moco
+from osimlite.optimal.program import Program
+terms, missed = moco.evaluated(Program(moco.problem_of("study.omoco")), moco.MocoTrajectory.read("theirs.sto"))
+found = moco.solve("study.omoco")
+print(json.dumps([terms, missed[0].size, found.objective, found.success]))
+"""
+
+
+def test_markers_controls_and_bounds_over_time(tmp_path):
+    """Moco's solution has Moco's costs here, and ours costs no more."""
+    osim = pytest.importorskip("opensim")
+    model = osim.ModelFactory.createDoublePendulum()
+    model.addMarker(osim.Marker("tip", model.getBodySet().get(1), osim.Vec3(0.1, 0.05, 0.02)))
+    model.finalizeConnections()
+    model.printToXML(str(tmp_path / "model.osim"))
+    t = np.linspace(0.0, 1.0, 31)
+    places = np.stack([np.cos(2 * t), np.sin(2 * t), 0.01 * t], axis=1)
+    write_trc(tmp_path / "markers.trc", t, ("tip",), places)
+    write_sto(tmp_path / "controls.sto", "", t, ("/tau0", "/tau1"), np.stack([np.sin(3 * t), t * t], axis=1))
+    columns = {
+        "/jointset/j0/q0/value": np.sin(2 * t),
+        "/jointset/j0/q0/speed": 2 * np.cos(2 * t),
+        "/jointset/j1/q1/value": 0.3 * t,
+        "/jointset/j1/q1/speed": np.full(31, 0.3),
+        "/tau0": 0.5 * t + 0.1,
+        "/tau1": -0.2 * t,
+    }
+    guess = tmp_path / "guess.sto"
+    write_sto(guess, "", t, tuple(columns), np.column_stack([*columns.values()]))
+    counts = (
+        "num_controls=2\nnum_derivatives=0\nnum_input_controls=0\nnum_multipliers=0\nnum_parameters=0\nnum_slacks=0\n"
+    )
+    text = guess.read_text().partition("endheader")[2]
+    guess.write_text(f"inDegrees=no\n{counts}num_states=4\nDataType=double\nversion=3\nendheader{text}")
+    said = []
+    for command in (["-m", "tests.oracle.moco_goals"], ["-c", OURS]):
+        done = subprocess.run(
+            [sys.executable, *command],
+            cwd=tmp_path,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        said.append(json.loads(done.stdout.splitlines()[-1]))
+    theirs, (terms, missed, objective, success) = said
+    assert terms == pytest.approx(theirs, rel=1e-10)
+    assert missed < 1e-6 and success
+    assert objective <= sum(theirs.values()) * (1.0 + 1e-6)

@@ -1,0 +1,48 @@
+"""Variables between functions of time, which controls and states share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from osimlite.backends.symbols import casadi
+from osimlite.multibody.schema_functions import numeric
+from osimlite.optimal.bounds import Range
+from osimlite.optimal.point import Formula, Point, Rows
+from osimlite.optimal.problem import Problem
+from osimlite.optimal.tables import over_time
+from osimlite.schema.moco.path_constraints import MocoControlBoundConstraint, MocoStateBoundConstraint
+
+
+def rows_between(
+    constraint: MocoControlBoundConstraint | MocoStateBoundConstraint,
+    problem: Problem,
+    paths: Sequence[str],
+    variable: Callable[[Point, str], Formula],
+) -> Rows:
+    """For each of some variables how far it is above each of the functions.
+
+    Args:
+        constraint: with the functions.
+        problem: it is of.
+        paths: of the variables.
+        variable: gives one at a point.
+    """
+    ends = [("lower_bound", (0.0, math.inf)), ("upper_bound", (-math.inf, 0.0))]
+    functions = [(getattr(constraint, name), limits) for name, limits in ends]
+    functions = [pair for pair in functions if pair[0] is not None]
+    if constraint.equality_with_lower:
+        if constraint.lower_bound is None or constraint.upper_bound is not None:
+            raise problem.wrong(constraint, "equality_with_lower needs a lower_bound and no upper_bound")
+        functions = [(constraint.lower_bound, (0.0, 0.0))]
+    series = [
+        problem.given(partial(over_time, numeric(function, 1, f"a bound of '{constraint.name}'")))
+        for function, _ in functions
+    ]
+    limits: list[Range] = [limit for _ in paths for _, limit in functions]
+
+    def formula(point: Point) -> Formula:
+        return casadi.vertcat(*(variable(point, path) - point.at(own) for path in paths for own in series))
+
+    return Rows([f"{constraint.name} of {path}" for path in paths for _ in functions], formula, limits)

@@ -1,0 +1,16 @@
+"""Controls between functions of time."""
+
+from __future__ import annotations
+
+from osimlite.optimal.constraints.between import rows_between
+from osimlite.optimal.point import Point, Rows
+from osimlite.optimal.problem import Problem
+from osimlite.schema.moco.path_constraints import MocoControlBoundConstraint
+
+
+def rows(constraint: MocoControlBoundConstraint, problem: Problem) -> Rows:
+    """How far each control is above the functions."""
+    paths = [str(path) for path in constraint.control_paths]
+    for path in paths:
+        problem.expect(constraint, path, problem.functions.controls, "control")
+    return rows_between(constraint, problem, paths, Point.control)

@@ -1,0 +1,16 @@
+"""States between functions of time."""
+
+from __future__ import annotations
+
+from osimlite.optimal.constraints.between import rows_between
+from osimlite.optimal.point import Point, Rows
+from osimlite.optimal.problem import Problem
+from osimlite.schema.moco.path_constraints import MocoStateBoundConstraint
+
+
+def rows(constraint: MocoStateBoundConstraint, problem: Problem) -> Rows:
+    """How far each state is above the functions."""
+    paths = [str(path) for path in constraint.state_paths]
+    for path in paths:
+        problem.expect(constraint, path, problem.functions.states, "state")
+    return rows_between(constraint, problem, paths, Point.state)
