@@ -8,9 +8,15 @@ from osimlite.errors import SettingError
 from osimlite.text import or_known
 
 MERSON = "merson"
-INTEGRATORS = {MERSON: "RungeKuttaMerson", "adams": "Adams", "bdf": "BDF", "rosenbrock": "Rosenbrock"}
-"""The integrators with error control by the names that users give, with their own names: that of OpenSim, and those for
-stiff motion, whose kernels have the names that users give."""
+INTEGRATORS = {
+    MERSON: "RungeKuttaMerson",
+    "euler2": "SemiExplicitEuler2",
+    "adams": "Adams",
+    "bdf": "BDF",
+    "rosenbrock": "Rosenbrock",
+}
+"""The integrators with error control by the names that users give, which their kernels have, with their own names:
+two of Simbody's, of which OpenSim takes the first, and those for stiff motion."""
 
 DEFAULT_ACCURACY = 1e-3
 LOOSE = 1e-2
@@ -50,22 +56,23 @@ def weight(value: float) -> float:
     return 1.0 / abs(value) if abs(value) > 1.0 else 1.0
 
 
-def next_step_size(h: float, error: float, accuracy: float, cut: bool = False) -> float:
+def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: float) -> float:
     """Step to try after one of size h, as Simbody chooses it; less than h if and only if error > accuracy.
 
-    The estimated error goes with h^4, so 0.9 h (accuracy / error)^(1/4) should just do. That is taken if it is at
-    least a fifth more or, after a failure, a tenth less; never more than five times nor less than a tenth of h.
+    The estimated error goes with a power of h, so 0.9 h (accuracy / error)^(1/order) should just do. That is taken if
+    it is at least a fifth more or, after a failure, a tenth less; never more than five times nor less than a tenth of h.
 
     Args:
         h: step just tried, s.
         error: norm of its estimated error; infinite or not a number after a failed evaluation.
         accuracy: what the error may be.
         cut: whether the step was cut short by a limit, so that it is no ground for a larger one.
+        order: of the error.
     """
     if not isfinite(error):
         return 0.1 * h
     if error > accuracy:
-        wanted: float = 0.9 * h * (accuracy / error) ** 0.25
+        wanted: float = 0.9 * h * (accuracy / error) ** (1.0 / order)
         return max(min(wanted, 0.9 * h), 0.1 * h)
-    wanted = 0.9 * h * (accuracy / error) ** 0.25 if error > 0.0 else inf
+    wanted = 0.9 * h * (accuracy / error) ** (1.0 / order) if error > 0.0 else inf
     return h if cut or wanted < 1.2 * h else min(wanted, 5.0 * h)

@@ -40,8 +40,8 @@ class Options:
     accuracy: float | None = option(None, "Of the integrator, as in OpenSim.", shown="0.001", more="0.001 if left out.")
     integrator: str | None = option(
         None,
-        "'merson', whose steps are OpenSim's; 'adams' for smooth motion, as of few muscles; 'bdf' for stiff motion, as "
-        "of many; 'rosenbrock' for stiff motion at loose accuracy.",
+        "'merson', whose steps are OpenSim's; 'euler2', whose steps are SCONE's; 'adams' for smooth motion, as of few "
+        "muscles; 'bdf' for stiff motion, as of many; 'rosenbrock' for stiff motion at loose accuracy.",
         shown="merson",
     )
     fixed_step: float | None = option(

@@ -11,6 +11,7 @@ import re
 
 import pytest
 
+import osimlite
 from osimlite.simulation.engines.linking import COMPILED, PYTHON
 from tests.simulation.equations import runge_kutta_merson
 
@@ -39,11 +40,13 @@ def dynamics(model, state):
     return f, [initial.get(i) for i in range(size)]
 
 
-def manager_run(model, until, accuracy=None):
+def manager_run(model, until, accuracy=None, method=None):
     """Times that a Manager records, its last state, and (taken, attempted, realizations) of its integrator."""
     sink = opensim.StringLogSink()
     state = model.initSystem()
     manager = opensim.Manager(model)
+    if method is not None:
+        manager.setIntegratorMethod(method)
     if accuracy is not None:
         manager.setIntegratorAccuracy(accuracy)
     manager.initialize(state)
@@ -169,3 +172,35 @@ def test_a_free_joint_counts_one_coordinate_more():
     # Simbody weights errors of q by way of those of u, which rounds.
     assert [t for t, _ in steps] == pytest.approx(times[1:], abs=1e-9)
     assert steps[-1][1] == pytest.approx(last[:6] + last[7:], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("path", "until", "accuracy"),
+    [
+        ("walker/DynamicWalkerModel.osim", 1.0, 1e-3),
+        ("walker/DynamicWalkerModel.osim", 0.5, 1e-5),
+        ("kinematics/mixed_joint_tree.osim", 0.3, 1e-3),
+        ("lint/limb.osim", 0.3, 1e-3),
+        ("lint/muscle.osim", 0.3, 1e-3),
+    ],
+)
+def test_semi_explicit_steps_are_simbody_s(fixtures, path, until, accuracy):
+    """Contact, balls, constraints, muscles."""
+    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+    method = opensim.Manager.IntegratorMethod_SemiExplicitEuler2
+    model = opensim.Model(str(fixtures / path))
+    times, last, (taken, attempted, _) = manager_run(model, until, accuracy, method)
+    found = osimlite.simulate(
+        osimlite.read(fixtures / path),
+        to=until,
+        engine="compiled",
+        accuracy=accuracy,
+        integrator="euler2",
+        opensim_derivatives=True,
+        simbody_early_return=True,
+    )
+    assert len(times) == taken + 1
+    assert (found.summary["steps"], found.summary["attempted_steps"]) == (taken, attempted)
+    own = [*found.values[-1], *found.speeds[-1], *(rows[-1] for rows in found.auxiliary.values())]
+    # Contact makes of every rounding a hundred times as much in a second. Locked coordinates are no states of OpenSim's.
+    assert max(min(abs(here - there) for here in own) for there in last) < 1e-6

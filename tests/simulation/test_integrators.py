@@ -134,7 +134,7 @@ positive = st.floats(1e-12, 1e3)
 
 @given(positive, st.floats(0.0, 1e6), st.floats(1e-12, 0.5), st.booleans())
 def test_next_step(h, error, accuracy, cut):
-    new = next_step_size(h, error, accuracy, cut)
+    new = next_step_size(h, error, accuracy, cut, 4.0)
     assert 0.1 * h <= new <= 5.0 * h
     assert (new < h) == (error > accuracy)
     if new > h:
@@ -152,12 +152,12 @@ def test_next_step(h, error, accuracy, cut):
 )
 def test_next_step_where_a_given_one_is_wanted(wanted, chosen):
     """Factors of the present step; just below 0.9 the error exceeds the accuracy."""
-    assert next_step_size(1.0, 1e-3 * (0.9 / wanted) ** 4, 1e-3) == pytest.approx(chosen)
+    assert next_step_size(1.0, 1e-3 * (0.9 / wanted) ** 4, 1e-3, False, 4.0) == pytest.approx(chosen)
 
 
 @pytest.mark.parametrize("error", [math.nan, math.inf])
 def test_next_step_after_a_failed_evaluation(error):
-    assert next_step_size(1.0, error, 1e-3) == 0.1
+    assert next_step_size(1.0, error, 1e-3, False, 4.0) == 0.1
 
 
 def test_counts():

@@ -22,6 +22,8 @@ from osimlite.simulation.kernels.method import (
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
 HEAD, STATES, IS_IMPLICIT = MEMORY + 1, 3, False
+ORDER = 4.0
+"""Of the error."""
 
 
 def merson(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> int:
@@ -35,7 +37,8 @@ def merson(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) ->
     error = inf
     if staged(s, x, w, t0, t1, y0, y1, errors, stages) == OUTCOME.OK:
         error = step_error(s, x, w, t1, y0, y1, errors, h, 0)
-    h[NEXT_STEP] = min(max(next_step_size(step, error, accuracy, limit < t0 + 0.95 * step), h[SHORTEST]), h[LONGEST])
+    cut = limit < t0 + 0.95 * step
+    h[NEXT_STEP] = min(max(next_step_size(step, error, accuracy, cut, ORDER), h[SHORTEST]), h[LONGEST])
     # The shortest step that is allowed is taken whatever its error, as in Simbody.
     if error <= accuracy or (step <= h[SHORTEST] and error < inf):
         h[REACHED] = t1

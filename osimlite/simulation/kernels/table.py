@@ -18,6 +18,7 @@ LAW_MODULES = {
     "equilibrate": "dynamics",
     "run_several": "runs",
     "merson": "merson",
+    "euler2": "euler2",
     "adams": "multistep",
     "bdf": "multistep",
     "rosenbrock": "rosenbrock",
