@@ -62,6 +62,8 @@ class Task:
     integrator: str = "merson"
 
 
+CONTACT = "euler2"
+"""The integrator where feet touch the ground: contact sets the steps, whose order does not matter then."""
 STAND = {
     "pelvis_tilt": -0.05,
     "hip_flexion_r": 0.25,
@@ -114,7 +116,7 @@ def walk2d() -> Task:
         result: NDArray[np.bool_] = (seen["pelvis_ty"] < 0.7) | (np.abs(seen["pelvis_tilt"]) > 0.8)
         return result
 
-    return Task(_human, reward, is_over, hidden=("pelvis_tx",), start=_shaken(0.01))
+    return Task(_human, reward, is_over, hidden=("pelvis_tx",), start=_shaken(0.01), integrator=CONTACT)
 
 
 def jump() -> Task:
@@ -127,7 +129,10 @@ def jump() -> Task:
         result: NDArray[np.bool_] = (seen["pelvis_ty"] < 0.4) | (np.abs(seen["pelvis_tilt"]) > 1.5)
         return result
 
-    return Task(lambda: jumper(driven=False), reward, is_over, hidden=("pelvis_tx",), start=_shaken(0.002), seconds=1.0)
+    return Task(
+        lambda: jumper(driven=False), reward, is_over, hidden=("pelvis_tx",), start=_shaken(0.002), seconds=1.0,
+        integrator=CONTACT,
+    )  # fmt: skip
 
 
 UPPER, FORE, WANTED = 0.3, 0.25, 1.2
