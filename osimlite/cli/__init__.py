@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 COMMANDS = (
     "build", "validate", "rule", "format", "upgrade", "diff", "info", "translate", "view", "simulate", "sweep",
     "optimize", "gait", "find-gait", "muscles", "modify", "scale", "fit", "ik", "kinematics", "inverse-dynamics",
-    "static-optimization", "run", "check-trial", "lsp", "doctor", "demo",
+    "static-optimization", "run", "check-trial", "scone", "lsp", "doctor", "demo",
 )  # fmt: skip
 """Every command in the order of the help; ``osimlite.cli.<name>.<name>``, with _ for -, is its function."""
 

@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from osimlite.gym.copies import Copies
+from osimlite.simulation.copies import Copies
 from osimlite.gym.tasks import TASKS, Seen, Task, of_model
 from osimlite.multibody.spatial import Array
 

@@ -48,6 +48,7 @@ class Copies:
         self.engine.drive(driven)
         self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
         self._places = self._places_of(driven)
+        self._step = step
         options = BatchOptions(to=step, accuracy=accuracy, integrator=integrator)
         options.check()
         vectors = np.tile(engine.numbers, (count, 1))
@@ -77,12 +78,17 @@ class Copies:
         self._batch.states[which] = states
         self._batch.clocks[which, 1] = self._first_step
 
-    def step(self, controls: Array) -> NDArray[np.bool_]:
-        """Hold controls (w, c) for a step; which of the copies (w,) could go on to its end."""
+    def step(self, controls: Array, rests: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
+        """Hold controls (w, c) for a step; which of the copies (w,) could go on to its end.
+
+        Args:
+            controls: of all copies.
+            rests: those that stay as they are (w,).
+        """
         batch = self._batch
         self._vectors[:, self._places] = controls
         # Each step is a run of its own: a method that goes by earlier steps has none, those of other copies least of all.
-        batch.clocks[:, 0] = 0.0
+        batch.clocks[:, 0] = 0.0 if rests is None else np.where(rests, self._step, 0.0)
         batch.counts[:] = batch.endings[:] = 0
         if self._pool is None:
             for room, part in zip(self._rooms, self._parts, strict=True):

@@ -1,0 +1,70 @@
+"""``osimlite scone``: scenarios of SCONE."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from osimlite.cli._command import Argument, Option, command
+
+
+@command
+def scone(
+    scenario: Annotated[Path, Argument(metavar="SCENARIO", help="A .scone file.", show_default=False)],
+    par: Annotated[
+        Path | None,
+        Option(
+            "--par",
+            metavar="FILE",
+            help="Parameters (.par) to walk with.",
+            show_default="those that the scenario begins with",
+        ),
+    ] = None,
+    optimize: Annotated[bool, Option("--optimize", help="Look for better ones.")] = False,
+    generations: Annotated[int, Option(metavar="N", help="How many.")] = 1000,
+    population: Annotated[int, Option(metavar="N", help="Candidates of each generation.")] = 16,
+    seed: Annotated[int, Option(help="The same seed, the same search.")] = 0,
+    duration: Annotated[
+        float | None, Option("--to", metavar="SECONDS", help="Length of a walk.", show_default="that of the scenario")
+    ] = None,
+    resume: Annotated[bool, Option("--resume", help="Go on with a search.")] = False,
+    output: Annotated[
+        Path, Option("-o", "--output", metavar="FOLDER", help="For states.sto, excitations.sto, best.par.")
+    ] = Path("scone"),
+) -> None:
+    """Have the human of a scenario walk, or look for the parameters with which it does best.
+
+    Of SCONE's parts are there: ModelOpenSim4, GaitStateController with its reflexes of muscles and coordinates,
+    measures of gait, effort, coordinates and forces of the ground, CMA-ES. All else is refused by its name and line.
+
+    Example: osimlite scone 'Gait2D - H0918 - OpenSim4.scone' -o walk
+    """
+    from osimlite.cli._console import Facts, show
+    from osimlite.files import make_folder
+    from osimlite.reflexes.parameters import read_par
+    from osimlite.reflexes.scenario import Scenario
+    from osimlite.reflexes.search import BEST, search
+    from osimlite.simulation.files.storage import write_sto
+
+    given = Scenario(scenario)
+    values = given.best() if par is None else {name: own[0] for name, own in read_par(par).items()}
+    files = []
+    if optimize:
+        values = search(
+            given, output, generations=generations, population=population, seed=seed, resume=resume,
+            tell=lambda each: show(f"{each}\n", err=True),
+        )  # fmt: skip
+        files.append(output / BEST)
+    walked = given.walk(values, duration=duration)
+    make_folder(output)
+    for name, table in (("states", walked.states), ("excitations", walked.excitations), ("loads", walked.loads)):
+        files.append(output / f"{name}.sto")
+        write_sto(files[-1], name, table.times, table.columns, table.rows)
+    facts = Facts(f"{given.model.name} {walked.times[0]:.3f} s")
+    facts.add("result", f"{walked.results[0]:.6g}")
+    for name, term in walked.terms.items():
+        facts.add(name, f"{term[0]:.6g}")
+    for name, report in walked.report.items():
+        facts.add(name, f"{report[0]:.6g}")
+    facts.add("files", ", ".join(map(str, files)))
+    facts.show()

@@ -1,0 +1,1 @@
+"""Humans that walk by reflexes: the scenarios of SCONE, run without it (docs/reflexes.md)."""

@@ -1,0 +1,123 @@
+"""Parameters of a scenario: their names, where they begin, and files of their values (.par)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from osimlite.errors import DocumentError, MissingFileError
+from osimlite.multibody.spatial import Array
+from osimlite.reflexes.settings import Node
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_FORM = re.compile(rf"(?P<mean>{_NUMBER})?(?:~(?P<std>{_NUMBER})?)?(?:<(?P<low>{_NUMBER}),(?P<high>{_NUMBER})>)?$")
+AUTO = 0.1
+"""A standard deviation that nothing tells, as part of the mean."""
+
+
+class Parameter(NamedTuple):
+    """A number that is looked for.
+
+    Attributes:
+        name: with what stands above it, as ``S00011.vasti.KF``.
+        mean, std: where the search begins, and how wide.
+        low, high: bounds.
+    """
+
+    name: str
+    mean: float
+    std: float
+    low: float
+    high: float
+
+
+class Parameters:
+    """The values of the parameters of some candidates, and which parameters there are.
+
+    Args:
+        values: by name, of each candidate (w,), or one for all; those without stand for their means.
+        count: of candidates.
+
+    Attributes:
+        found: all that were asked for.
+        auto: standard deviation that is not told, as part of the mean.
+    """
+
+    def __init__(self, values: Mapping[str, Array | float], count: int = 1) -> None:
+        self.values, self.count, self.found, self.auto = values, count, dict[str, Parameter](), AUTO
+
+    def of(self, node: Node, key: str, otherwise: float, name: str = "") -> Array:
+        """A number of each candidate (w,): what is written, or the parameter that is.
+
+        Args:
+            node: that it is part of.
+            key: of it.
+            otherwise: if it is not given.
+            name: of the parameter; the key if empty.
+
+        Raises:
+            DocumentError: it is neither a number nor a parameter.
+        """
+        part = node.get(key)
+        if part is None:
+            return np.full(self.count, otherwise)
+        # ``1~0.5<0,2>``, ``~1<0,2>``, or a block of mean, std, min and max.
+        if part.parts:
+            mean, std = part.number("mean"), part.number("std", np.nan)
+            low, high = part.number("min", -np.inf), part.number("max", np.inf)
+            return self._asked(name or key, mean, std, low, high)
+        return self.read(part, name or key)
+
+    def read(self, part: Node, name: str) -> Array:
+        """As `of`, from the node itself."""
+        text = part.value
+        match = _FORM.match(text)
+        if match is None or not text:
+            raise part.error(f"'{name}' must be a number or a parameter such as 1~0.1<0,2>, not '{text}'")
+        if "~" not in text and match["low"] is None:
+            return np.full(self.count, float(text))
+        mean, std = match["mean"], match["std"]
+        if mean is None:
+            mean, std = std, None
+        if mean is None:
+            raise part.error(f"the parameter '{name}' has no mean")
+        low, high = (
+            float(match[end]) if match[end] is not None else way for end, way in (("low", -np.inf), ("high", np.inf))
+        )
+        return self._asked(name, float(mean), np.nan if std is None else float(std), low, high)
+
+    def _asked(self, name: str, mean: float, std: float, low: float, high: float) -> Array:
+        std = self.auto * abs(mean) if np.isnan(std) else std
+        self.found.setdefault(name, Parameter(name, mean, std, low, high))
+        value = self.values.get(name, mean)
+        return np.clip(np.broadcast_to(np.asarray(value, dtype=float), (self.count,)), low, high)
+
+
+def read_par(path: str | Path) -> dict[str, tuple[float, float, float]]:
+    """The best, the mean and the standard deviation of each parameter of a file.
+
+    Raises:
+        MissingFileError: there is no such file.
+        DocumentError: a line has no name and three numbers.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise MissingFileError("no such file", file=str(path)) from None
+    result = {}
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.split()
+        if not words:
+            continue
+        try:
+            best, mean, std = (float(word) for word in words[1:4])
+        except ValueError:
+            raise DocumentError(
+                "a name, best, mean and standard deviation are wanted", file=str(path), line=number
+            ) from None
+        result[words[0]] = best, mean, std
+    return result

@@ -1,0 +1,302 @@
+"""A scenario of SCONE: a model, its controller, how it is judged, and what is looked for."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.document.reader import read
+from osimlite.errors import SimulationError
+from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
+from osimlite.reflexes.controllers import CONTROLLERS, Reflexes
+from osimlite.reflexes.measures import MEASURES, Measure
+from osimlite.reflexes.parameters import Parameter, Parameters, read_par
+from osimlite.reflexes.settings import Node, found_file, read_settings
+from osimlite.reflexes.walkers import Felt, Walkers
+from osimlite.simulation.files.storage import StoTable
+from osimlite.text import listed, or_known
+
+OPTIMIZERS = "CmaOptimizer", "CmaPoolOptimizer"
+INTEGRATORS = {"SemiExplicitEuler2": "euler2", "RungeKuttaMerson": "merson"}
+HIGH, CLOSE, TRIES = 10.0, 0.1, 100
+"""How far a walker is lifted or lowered at most to carry its weight (m), how well it has to carry it, and tries."""
+LIFT = 0.1
+"""M, by which it is lifted at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Walked:
+    """What became of some candidates.
+
+    Attributes:
+        results: what is to become small (w,).
+        times: when each ended, s (w,).
+        terms: parts of the results, by the names of measures.
+        report: what measures say besides.
+        states: of the first candidate over time.
+        excitations: of its muscles.
+        loads: forces on its legs, over the weight.
+    """
+
+    results: Array
+    times: Array
+    terms: dict[str, Array]
+    report: dict[str, Array]
+    states: StoTable
+    excitations: StoTable
+    loads: StoTable
+
+
+class Scenario:
+    """A scenario that was read.
+
+    Args:
+        path: of its file.
+
+    Attributes:
+        model: that walks.
+        controller: name and part of what excites the muscles.
+        measure: name and part of what judges.
+        begun: parameters that a file of the scenario begins with: best, mean and standard deviation.
+        duration: of a walk, s.
+
+    Raises:
+        DocumentError: it has something that is not done here; its name and line are told.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self.folder = self.path.parent
+        top = read_settings(self.path)
+        found = next(iter(top.all_of(*OPTIMIZERS)), None)
+        self.optimizer = top if found is None else found[1]
+        objective = self.optimizer.get("SimulationObjective")
+        if objective is None:
+            raise self.optimizer.error("a scenario needs a SimulationObjective in a CmaOptimizer")
+        self._objective = objective
+        self.duration = objective.number("max_duration", 1e3)
+        settings = objective.get("ModelOpenSim4")
+        if settings is None:
+            other = next((name for name, _ in objective.parts if name.startswith("Model")), "no model")
+            raise objective.error(f"of models only ModelOpenSim4 is done here, and this has {other}")
+        self._settings: Node = settings
+        self.model = read(found_file(settings.text("model_file"), self.folder))
+        self.step = settings.number("fixed_control_step_size", 0.005)
+        self.begun = self._begun()
+        self._walkers: dict[int, Walkers] = {}
+        self._refuse()
+
+    def _begun(self) -> dict[str, tuple[float, float, float]]:
+        result: dict[str, tuple[float, float, float]] = {}
+        for _, init in self.optimizer.all_of("init"):
+            own = read_par(found_file(init.text("file"), self.folder))
+            factor, best = init.number("std_factor", 1.0), init.flag("use_best_as_mean", False)
+            result |= {name: (v[0], v[0] if best else v[1], factor * v[2]) for name, v in own.items()}
+        return result
+
+    def _refuse(self) -> None:
+        objective, settings = self._objective, self._settings
+        for key in ("initial_load_dof", "state_init_file", "integration_method", "integration_accuracy", "initial_load",
+                    "initial_state_offset", "initial_state_offset_exclude", "initial_state_offset_include",
+                    "initial_state_offset_symmetric", "leg_upper_body", "leg_lower_body", "leg_contact_force",
+                    "initial_equilibration_activation", "name", "max_integration_step_size"):  # fmt: skip
+            settings.get(key)
+        settings.expect_all_asked("a ModelOpenSim4")
+        controller, measure = (next(iter(objective.all_of(*names)), None) for names in (CONTROLLERS, MEASURES))
+        if controller is None:
+            other = next((name for name, _ in objective.parts if name.endswith("Controller")), "none")
+            raise objective.error(f"of controllers {listed(list(CONTROLLERS))} are done here, and this has {other}")
+        if measure is None:
+            raise objective.error(f"a measure is needed: {listed(list(MEASURES))}")
+        self.controller, self.measure = controller, measure
+        for key in ("name", "signature_prefix"):
+            objective.get(key)
+        objective.expect_all_asked("a SimulationObjective", tuple(MEASURES))
+        method = settings.text("integration_method", "SemiExplicitEuler2")
+        if method not in INTEGRATORS:
+            raise settings.error(f"there is no integrator '{method}'{or_known(method, INTEGRATORS)}")
+        self._integrator = INTEGRATORS[method]
+
+    # ---------------------------------------------------------------------------------------------- candidates
+    def best(self) -> dict[str, float]:
+        """The best values that the scenario begins with."""
+        return {name: best for name, (best, _, _) in self.begun.items()}
+
+    def parameters(self) -> list[Parameter]:
+        """All that are looked for, with the means and widths that the scenario begins with."""
+        found = Parameters({})
+        Candidates(self, found)
+        result = []
+        for each in found.found.values():
+            _, mean, std = self.begun.get(each.name, (each.mean, each.mean, each.std))
+            result.append(each._replace(mean=mean, std=std))
+        return result
+
+    def walk(
+        self,
+        values: Mapping[str, Array | float],
+        count: int = 1,
+        *,
+        duration: float | None = None,
+        tell: Callable[[float], None] | None = None,
+    ) -> Walked:
+        """Have candidates walk until they fall, or to the end.
+
+        Args:
+            values: of the parameters, of each candidate (w,) or one for all.
+            count: of candidates.
+            duration: s; that of the scenario if None.
+            tell: is told the time that was reached, s.
+        """
+        candidates = Candidates(self, Parameters(values, count))
+        return candidates.walk(self.duration if duration is None else duration, tell)
+
+    def walkers(self, count: int) -> Walkers:
+        """So many walkers of the model; kept, as making them takes longer than a walk."""
+        if count not in self._walkers:
+            node = self._settings
+            self._walkers[count] = Walkers(
+                self.model.copy_deep(),
+                count,
+                self.step,
+                node.number("integration_accuracy", 1e-3),
+                self._integrator,
+                node.text("leg_upper_body", "femur"),
+                node.text("leg_lower_body", ""),
+                node.text("leg_contact_force", "foot"),
+            )
+        return self._walkers[count]
+
+    def close(self) -> None:
+        """Free the engines."""
+        for each in self._walkers.values():
+            each.close()
+        self._walkers.clear()
+
+
+class Candidates:
+    """Some candidates of a scenario, at their start."""
+
+    def __init__(self, scenario: Scenario, parameters: Parameters) -> None:
+        self.scenario, self.parameters = scenario, parameters
+        self.walkers = scenario.walkers(parameters.count)
+        self._start()
+        kind, controller = scenario.controller
+        self.controller = Reflexes(controller, kind, self.walkers, parameters)
+        name, own = scenario.measure
+        self.measure: Measure = MEASURES[name](own, self.walkers)
+
+    def _start(self) -> None:
+        """States at the start, in which the ground carries what it is to carry."""
+        walkers, node, scenario = self.walkers, self.scenario._settings, self.scenario
+        states = walkers.copies.states
+        walkers.copies.put(slice(None), np.tile(walkers.copies.start, (walkers.count, 1)))
+        file = node.text("state_init_file", "")
+        if file:
+            self._read_state(found_file(file, scenario.folder))
+        offset = node.get("initial_state_offset")
+        if offset is not None:
+            included = node.text("initial_state_offset_include", "*").split(";")
+            excluded = [*node.text("initial_state_offset_exclude", "").split(";"), "*/activation", "*/fiber_length"]
+            symmetric = node.flag("initial_state_offset_symmetric", False)
+            for path, place in walkers.places.items():
+                if _matches(path, included) and not _matches(path, excluded):
+                    name = path.replace("_l/", "/").replace("_r/", "/") if symmetric else path
+                    states[:, place] += self.parameters.read(offset, f"{name}.offset")
+        load = node.number("initial_load", 0.2)
+        height = walkers.places.get(node.text("initial_load_dof", "/jointset/ground_pelvis/pelvis_ty/value"))
+        if load > 0.0 and height is not None:
+            for k in range(walkers.count):
+                states[k] = _loaded(walkers, states[k], height, load)
+
+    def _read_state(self, path: Path) -> None:
+        walkers = self.walkers
+        top = read_settings(path)
+        for block, ending in (("values", "value"), ("velocities", "speed")):
+            part = top.get(block)
+            for name, node in part.parts if part is not None else ():
+                place = next((at for full, at in walkers.places.items() if full.endswith(f"/{name}/{ending}")), None)
+                if place is None:
+                    raise node.error(f"the model has no coordinate '{name}'{or_known(name, walkers.coordinates)}")
+                try:
+                    walkers.copies.states[:, place] = float(node.value)
+                except ValueError:
+                    raise node.error(f"'{name}' must be a number, not '{node.value}'") from None
+
+    def walk(self, duration: float, tell: Callable[[float], None] | None) -> Walked:
+        """As of `Scenario.walk`."""
+        walkers, controller, measure = self.walkers, self.controller, self.measure
+        most = np.ones(len(walkers.names))
+        small = self.scenario._settings.number("initial_equilibration_activation", 0.05)
+        walkers.equilibrated(np.full((walkers.count, len(most)), small))
+        felt = walkers.felt()
+        controller.begin(felt)
+        walkers.equilibrated(np.clip(controller.inputs(felt), walkers.least, most))
+        felt = walkers.felt()
+        measure.begin(felt)
+        going, times = np.ones(walkers.count, dtype=bool), np.zeros(walkers.count)
+        rows: list[tuple[float, Array, Array, Array]] = []
+        for number in range(1, round(duration / walkers.step) + 1):
+            excitations = np.clip(controller.inputs(felt), walkers.least, most)
+            if going[0]:
+                rows.append(((number - 1) * walkers.step, felt.states[0].copy(), excitations[0], felt.loads[0]))
+            good = walkers.copies.step(excitations, ~going)
+            felt = walkers.felt()
+            controller.sensors.note(felt)
+            t = number * walkers.step
+            times[going] = t
+            going &= good
+            measure.counted(t, felt, excitations, going)
+            going &= ~measure.failed
+            if tell is not None and number % round(1.0 / walkers.step) == 0:
+                tell(t)
+            if not going.any():
+                break
+        rows.append((float(times[0]), felt.states[0].copy(), excitations[0], felt.loads[0]))
+        terms: dict[str, Array] = {}
+        results = measure.weighted(times, duration, terms)
+        return Walked(results, times, terms, measure.report, *self._tables(rows))
+
+    def _tables(self, rows: Sequence[tuple[float, Array, Array, Array]]) -> tuple[StoTable, StoTable, StoTable]:
+        walkers = self.walkers
+        times = np.array([row[0] for row in rows])
+        states, excitations, loads = (np.array([row[k] for row in rows]) for k in (1, 2, 3))
+        legs = tuple(f"leg{leg.side}.load" for leg in walkers.legs)
+        return (
+            StoTable("states", times, tuple(walkers.places), states[:, [*walkers.places.values()]]),
+            StoTable("excitations", times, tuple(walkers.names), excitations),
+            StoTable("loads", times, legs, loads),
+        )
+
+
+def _matches(path: str, patterns: Sequence[str]) -> bool:
+    return any(fnmatch.fnmatchcase(path, pattern) for pattern in patterns if pattern)
+
+
+def _loaded(walkers: Walkers, state: Array, height: int, load: float) -> Array:
+    """The state with the height in which the ground carries a part of the weight, as SCONE looks for it."""
+    state = state.copy()
+    start = float(state[height])
+
+    def carried(value: float) -> float:
+        state[height] = value
+        felt: Felt = walkers.looked(state[None])
+        return float(felt.loads[0].sum())
+
+    top = start
+    while carried(top) > load and top - start < HIGH:
+        top += LIFT
+    bottom = top - LIFT
+    while carried(bottom) <= load and bottom - start > -HIGH:
+        bottom -= LIFT
+    for _ in range(TRIES):
+        middle = 0.5 * (top + bottom)
+        found = carried(middle)
+        if abs(found - load) / load <= CLOSE:
+            return state
+        top, bottom = (top, middle) if found > load else (middle, bottom)
+    raise SimulationError(f"in no height the ground carries {load:g} of the weight")

@@ -1,0 +1,121 @@
+"""The search for parameters with which a scenario goes best: CMA-ES, all candidates of a generation at once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from osimlite._require import require
+from osimlite.errors import SettingError
+from osimlite.files import make_folder, written_atomically
+from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
+from osimlite.reflexes.parameters import Parameter, read_par
+from osimlite.reflexes.scenario import Scenario
+
+BEST = "best.par"
+
+
+@dataclass(frozen=True, eq=False)
+class Generation:
+    """Where a search is.
+
+    Attributes:
+        number: of the generation.
+        best: result of the best candidate of all.
+        median: of this generation.
+        longest: how long its longest walk took, s.
+        per_minute: generations.
+    """
+
+    number: int
+    best: float
+    median: float
+    longest: float
+    per_minute: float
+
+    def __str__(self) -> str:
+        rate = f"{self.per_minute:.3g} generations/min"
+        return f"{self.number:5d}  best {self.best:.6g}  median {self.median:.6g}  longest {self.longest:.2f} s  {rate}"
+
+
+def search(
+    scenario: Scenario,
+    folder: str | Path,
+    *,
+    generations: int = 1000,
+    population: int = 16,
+    seed: int = 0,
+    resume: bool = False,
+    tell: Callable[[Generation], None] | None = None,
+) -> dict[str, float]:
+    """Look for parameters whose result is least; the best is written whenever it gets better, Ctrl-C ends the search.
+
+    Args:
+        scenario: whose.
+        folder: for ``best.par``, which SCONE reads, too.
+        generations: how many.
+        population: candidates of each.
+        seed: the same seed, the same search.
+        resume: whether it begins with the file that is in the folder.
+        tell: is told of each generation.
+
+    Returns:
+        The best parameters.
+
+    Raises:
+        MissingDependency: cma is not installed.
+        SettingError: nothing is looked for.
+    """
+    strategy = require("cma", extra="optimize", purpose="the search for parameters")
+    own = scenario.parameters()
+    if not own:
+        raise SettingError("the scenario has no parameters, which are written as 1~0.1<0,2>")
+    path = Path(folder) / BEST
+    if resume:
+        known = read_par(path)
+        own = [
+            each._replace(mean=known[each.name][1], std=known[each.name][2]) if each.name in known else each
+            for each in own
+        ]
+    make_folder(Path(folder))
+    scale = np.array([each.std if each.std > 0.0 else 1e-6 for each in own])
+    middle = np.array([each.mean for each in own])
+    lows, highs = ((np.array([getattr(each, end) for each in own]) - middle) / scale for end in ("low", "high"))
+    options = {"bounds": [lows, highs], "popsize": population, "seed": seed + 1, "verbose": -9}
+    es = strategy.CMAEvolutionStrategy(np.zeros(len(own)), 1.0, options)
+    best, least = middle.copy(), np.inf
+    begin = time.perf_counter()
+    try:
+        for number in range(1, generations + 1):
+            points = np.array(es.ask())
+            values = middle + scale * points
+            walked = scenario.walk({each.name: values[:, k] for k, each in enumerate(own)}, population)
+            es.tell(list(points), walked.results.tolist())
+            place = int(np.argmin(walked.results))
+            if walked.results[place] < least:
+                best, least = values[place], float(walked.results[place])
+                write_par(path, own, best, middle + scale * es.mean, scale * es.sigma * np.sqrt(np.diag(es.C)))
+            if tell is not None:
+                rate = 60.0 * number / (time.perf_counter() - begin)
+                tell(Generation(number, least, float(np.median(walked.results)), float(walked.times.max()), rate))
+            if es.stop():
+                break
+    except KeyboardInterrupt:
+        pass
+    return dict(zip((each.name for each in own), best.tolist(), strict=True))
+
+
+def write_par(path: Path, parameters: list[Parameter], best: Array, mean: Array, std: Array) -> None:
+    """Write parameters as SCONE does: name, best, mean, standard deviation.
+
+    Raises:
+        OsimliteError: it cannot be written.
+    """
+    with written_atomically(path) as stream:
+        for each, *numbers in zip(parameters, best, mean, std, strict=True):
+            line = "\t".join(f"{number:.9g}" for number in numbers)
+            stream.write(f"{each.name:<32}\t{line}\n".encode())

@@ -1,0 +1,212 @@
+"""Files of SCONE (.scone, .zml): trees of keys and values, with includes and constants."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from osimlite.errors import DocumentError, MissingFileError
+from osimlite.records import dataclass, field
+from osimlite.text import did_you_mean
+
+_TOKEN = re.compile(r'\s+|#[^\n]*|(?P<token>"[^"]*"|<<|>>|[{}=\[\]]|[^\s{}=\[\]#"]+)')
+_MOST_DEEP = 20
+"""Files that may include one another."""
+
+
+@dataclass
+class Node:
+    """A value, and what stands below it.
+
+    Attributes:
+        value: as it is written; "" if there is none.
+        parts: below it, in their order.
+        file, line: where it stands.
+        asked: keys that something has asked for.
+    """
+
+    value: str = ""
+    parts: list[tuple[str, Node]] = field(default_factory=list)
+    file: str = ""
+    line: int = 0
+    asked: set[str] = field(default_factory=set)
+
+    def get(self, key: str) -> Node | None:
+        """The first part of a name."""
+        self.asked.add(key)
+        return next((node for name, node in self.parts if name == key), None)
+
+    def text(self, key: str, otherwise: str | None = None) -> str:
+        """The value of a part.
+
+        Raises:
+            DocumentError: there is none, and nothing to take otherwise.
+        """
+        found = self.get(key)
+        if found is not None:
+            return found.value
+        if otherwise is None:
+            raise self.error(f"'{key}' is missing")
+        return otherwise
+
+    def number(self, key: str, otherwise: float | None = None) -> float:
+        """The number that a part is.
+
+        Raises:
+            DocumentError: it is none.
+        """
+        found = self.get(key)
+        if found is None and otherwise is not None:
+            return otherwise
+        text = self.text(key)
+        try:
+            return float(text)
+        except ValueError:
+            raise (found or self).error(f"'{key}' must be a number, not '{text}'") from None
+
+    def flag(self, key: str, otherwise: bool) -> bool:
+        """Whether a part is 1 or true."""
+        return self.text(key, "1" if otherwise else "0").lower() in ("1", "true", "yes")
+
+    def all_of(self, *names: str) -> Iterator[tuple[str, Node]]:
+        """The parts of some names, in their order."""
+        self.asked.update(names)
+        return ((name, node) for name, node in self.parts if name in names)
+
+    def error(self, message: str) -> DocumentError:
+        """An error about this place."""
+        return DocumentError(message, file=self.file, line=self.line or None)
+
+    def expect_all_asked(self, what: str, known: tuple[str, ...] = ()) -> None:
+        """Refuse parts that nothing has asked for.
+
+        Raises:
+            DocumentError: there is one; it names the nearest that is known.
+        """
+        for name, node in self.parts:
+            if name not in self.asked:
+                near = did_you_mean(name, {*self.asked, *known})
+                raise node.error(f"'{name}' of {what} is not done here{near}")
+
+
+def read_settings(path: str | Path) -> Node:
+    """Read a file, and those that it includes, which are looked for beside it and in its folders above.
+
+    Raises:
+        MissingFileError: a file is not there.
+        DocumentError: one is damaged; with its line.
+    """
+    constants: dict[str, str] = {}
+    return _read(Path(path), Path(path).parent, constants, 0)
+
+
+def _read(path: Path, base: Path, constants: dict[str, str], depth: int) -> Node:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise MissingFileError("no such file", file=str(path)) from None
+    except (OSError, UnicodeError) as error:
+        raise DocumentError(f"cannot be read: {error}", file=str(path)) from None
+    if depth > _MOST_DEEP:
+        raise DocumentError("the files include one another without end", file=str(path))
+    tokens = []
+    line = 1
+    place = 0
+    while place < len(text):
+        found = _TOKEN.match(text, place)
+        if found is None:
+            raise DocumentError(
+                f"a quotation mark is not closed: {text[place : place + 20]!r}", file=str(path), line=line
+            )
+        if found["token"] is not None:
+            tokens.append((found["token"], line))
+        line += found.group().count("\n")
+        place = found.end()
+    reader = _Reader(tokens, path, base, constants, depth)
+    top = Node(file=str(path), line=1)
+    reader.fill(top)
+    if reader.place < len(tokens):
+        raise top.error(f"line {tokens[reader.place][1]}: a '}}' without its '{{'")
+    return top
+
+
+class _Reader:
+    def __init__(
+        self, tokens: list[tuple[str, int]], path: Path, base: Path, constants: dict[str, str], depth: int
+    ) -> None:
+        self.tokens, self.path, self.base, self.constants, self.depth, self.place = (
+            tokens,
+            path,
+            base,
+            constants,
+            depth,
+            0,
+        )
+
+    def next(self) -> str:
+        if self.place >= len(self.tokens):
+            raise DocumentError("the file ends in the middle of something", file=str(self.path), line=self.line())
+        self.place += 1
+        return self.tokens[self.place - 1][0]
+
+    def line(self) -> int:
+        return self.tokens[min(self.place, len(self.tokens)) - 1][1] if self.tokens else 1
+
+    def fill(self, node: Node) -> None:
+        while self.place < len(self.tokens) and self.tokens[self.place][0] != "}":
+            key = self.next()
+            if key == "<<":
+                words = []
+                while (word := self.next()) != ">>":
+                    words.append(word.strip('"'))
+                node.parts += self._included(" ".join(words)).parts
+                continue
+            part = Node(file=str(self.path), line=self.line())
+            what = self.next() if self.place < len(self.tokens) else ""
+            if what == "=":
+                part.value = self._value()
+                if self.place < len(self.tokens) and self.tokens[self.place][0] == "{":
+                    what = self.next()
+            if what == "{":
+                self.fill(part)
+                if self.next() != "}":
+                    raise part.error(f"'{key}' has no end")
+            elif what != "=":
+                raise part.error(f"after '{key}' a '=' or a '{{' is wanted, not '{what}'")
+            if key.startswith("$"):
+                self.constants[key] = part.value
+            else:
+                node.parts.append((key.strip('"'), part))
+
+    def _value(self) -> str:
+        value = self.next()
+        if value == "[":
+            words = []
+            while (word := self.next()) != "]":
+                words.append(word.strip('"'))
+            return " ".join(words)
+        if value in ("{", "}", "="):
+            raise DocumentError(f"a value is wanted, not '{value}'", file=str(self.path), line=self.line())
+        if value.startswith("$"):
+            if value not in self.constants:
+                near = did_you_mean(value, self.constants)
+                raise DocumentError(f"there is no constant '{value}'{near}", file=str(self.path), line=self.line())
+            return self.constants[value]
+        return value.strip('"')
+
+    def _included(self, name: str) -> Node:
+        return _read(found_file(name, self.path.parent, self.base), self.base, self.constants, self.depth + 1)
+
+
+def found_file(name: str, *folders: Path) -> Path:
+    """A file that a scenario names: beside it, or in one of the folders above.
+
+    Raises:
+        MissingFileError: it is in none.
+    """
+    for folder in folders:
+        for place in (folder, *folder.resolve().parents[:3]):
+            if (place / name).is_file():
+                return place / name
+    raise MissingFileError("no such file", file=str(folders[0] / name))
