@@ -10,7 +10,14 @@ from osimlite.cli._command import Argument, Option, command
 
 @command
 def scone(
-    scenario: Annotated[Path, Argument(metavar="SCENARIO", help="A .scone file.", show_default=False)],
+    scenario: Annotated[
+        Path,
+        Argument(
+            metavar="SCENARIO",
+            help="A .scone file; 'human-walks' is one of ours, which is written into the folder to be changed.",
+            show_default=False,
+        ),
+    ],
     par: Annotated[
         Path | None,
         Option(
@@ -37,15 +44,20 @@ def scone(
     Of SCONE's parts are there: ModelOpenSim4, GaitStateController with its reflexes of muscles and coordinates,
     measures of gait, effort, coordinates and forces of the ground, CMA-ES. All else is refused by its name and line.
 
-    Example: osimlite scone 'Gait2D - H0918 - OpenSim4.scone' -o walk
+    What comes out can be looked at: osimlite view walk/human.osim walk/states.sto
+
+    Example: osimlite scone human-walks -o walk
     """
     from osimlite.cli._console import Facts, show
     from osimlite.files import make_folder
+    from osimlite.models.walking import SCENARIO, write_scenario
     from osimlite.reflexes.parameters import read_par
     from osimlite.reflexes.scenario import Scenario
     from osimlite.reflexes.search import BEST, search
     from osimlite.simulation.files.storage import write_sto
 
+    if str(scenario) == SCENARIO:
+        scenario = write_scenario(output)
     given = Scenario(scenario)
     values = given.best() if par is None else {name: own[0] for name, own in read_par(par).items()}
     files = []

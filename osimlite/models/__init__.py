@@ -7,6 +7,7 @@ BUILT_IN = {
     "furthest-walker": "osimlite.models.walkers:furthest_walker",
     "steady-walker": "osimlite.models.walkers:steady_walker",
     "human-walker": "osimlite.models.walkers:human_walker",
+    "human": "osimlite.models.walking:human",
     "jumper": "osimlite.models.jumper:jumper",
 }
 """Name on the command line, and where the function is that makes the model."""

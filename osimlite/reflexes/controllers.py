@@ -139,13 +139,14 @@ class Reflexes:
         self._terms: list[Term] = []
         self._gates: list[Gate] = []
         self._load_delay = 0.0
-        self._has_states = kind == "GaitStateController"
+        self._has_states, self._is_sided = kind == "GaitStateController", True
         if self._has_states:
             walkers.expect_legs()
             self._read_states(node, parameters)
         else:
             self.symmetric = node.flag("symmetric", False)
-            for leg in (0, 1) if node.flag("dual_sided", True) else (0,):
+            self._is_sided = node.flag("dual_sided", True)
+            for leg in (0, 1) if self._is_sided else (0,):
                 self._add_reflexes(node, parameters, "", leg, (True,) * len(STATES))
         self._compile()
 
@@ -227,6 +228,8 @@ class Reflexes:
 
         def named(name: str) -> str:
             bare = name[:-2] if name.endswith(SIDES) else name
+            if not self._is_sided:
+                return name
             if not symmetric:
                 return name if name.endswith(SIDES) or bare in self.walkers.coordinates else bare + SIDES[leg]
             return f"{bare}_o" if name.endswith(SIDES) and not name.endswith(SIDES[leg]) else bare

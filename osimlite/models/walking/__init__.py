@@ -1,0 +1,54 @@
+"""A human who walks by reflexes: the jumper's body, standing, and a scenario whose parameters our own search found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from osimlite.document.printer import write
+from osimlite.files import make_folder, write_atomically
+from osimlite.models.jumper import jumper
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.forces import HuntCrossleyForce
+from osimlite.schema.model import Model
+
+SCENARIO = "human-walks"
+"""Name of the scenario, and of its files beside this one: what it is, its start, and its parameters."""
+ENDINGS = ".scone", ".zml", ".par"
+FAR = -5.0, 1000.0
+"""How far the human may walk, m."""
+STANDING = {
+    "pelvis_tilt": -0.05, "pelvis_ty": 0.945, "hip_flexion_r": 0.1, "hip_flexion_l": 0.1, "knee_angle_r": -0.1,
+    "knee_angle_l": -0.1, "ankle_angle_r": 0.05, "ankle_angle_l": 0.05,
+}  # fmt: skip
+"""Rad, m."""
+
+
+def human() -> Model:
+    """Build the human, with one force of the ground for each foot, as scenarios want it."""
+    model = jumper(driven=False)
+    model.name = "Human"
+    forces = {force.name: force for force in model.force_set.objects if isinstance(force, HuntCrossleyForce)}
+    for side in "rl":
+        heel, ball = forces[f"heel_{side}_force"], forces[f"ball_{side}_force"]
+        (own,), (other,) = heel.contact_parameters.objects, ball.contact_parameters.objects
+        own.geometry = (*own.geometry[:1], *other.geometry)
+        heel.name = f"foot_{side}"
+        model.remove(ball)
+    for coordinate in model.components(Coordinate):
+        coordinate.default_value = STANDING.get(coordinate.name, 0.0)
+        if coordinate.name == "pelvis_tx":
+            coordinate.range = FAR
+    return model
+
+
+def write_scenario(folder: Path) -> Path:
+    """Write the human and the scenario into a folder, to be run and changed; the path of the scenario.
+
+    Raises:
+        OsimliteError: they cannot be written.
+    """
+    make_folder(folder)
+    write(human(), folder / "human.osim")
+    for ending in ENDINGS:
+        write_atomically(folder / f"{SCENARIO}{ending}", Path(__file__).with_name(f"{SCENARIO}{ending}").read_bytes())
+    return folder / f"{SCENARIO}.scone"

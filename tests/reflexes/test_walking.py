@@ -1,0 +1,135 @@
+"""Humans that walk by reflexes: ours, and SCONE's where its sources are beside this repository."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+
+from osimlite.errors import OsimliteError
+from osimlite.models.walking import write_scenario
+from osimlite.reflexes.parameters import Parameters
+from osimlite.reflexes.scenario import Candidates, Scenario
+from tests.conftest import ROOT
+
+ARM = """
+CmaOptimizer {
+    SimulationObjective {
+        max_duration = 1
+        ModelOpenSim4 { model_file = arm.osim initial_load = 0 }
+        ReflexController {
+            dual_sided = 0
+            DofReflex { target = flexor source = elbow P0 = 1.2 KP = ~2<0,20> KV = 0.3 delay = 0.01 C0 = ~0.1<0,1> }
+            DofReflex { target = extensor source = elbow P0 = 1.2 KP = -1 allow_neg_P = 0 }
+        }
+        DofMeasure { dof = elbow start_time = 0.2 position { min = 65 max = 72 abs_penalty = 1 } }
+    }
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def ours(tmp_path_factory):
+    return Scenario(write_scenario(tmp_path_factory.mktemp("walk")))
+
+
+@pytest.fixture
+def arm(tmp_path):
+    from osimlite.document.printer import write
+    from osimlite.gym.tasks import arm as task
+
+    pytest.importorskip("gymnasium", reason="needs gymnasium (extra 'gym')")
+    write(task().model(), tmp_path / "arm.osim")
+    (tmp_path / "arm.scone").write_text(ARM)
+    return tmp_path / "arm.scone"
+
+
+def test_our_human_walks(ours) -> None:
+    walked = ours.walk(ours.best(), duration=4.0)
+    assert walked.times.tolist() == [4.0]
+    far = walked.states["/jointset/ground_pelvis/pelvis_tx/value"]
+    assert 1.0 < np.ptp(far) / 4.0 < 1.5
+    loads = walked.loads.rows[200:]
+    # Each foot carries the body in turn, and both do for a while.
+    assert (loads.max(axis=0) > 0.9).all() and (loads.min(axis=0) == 0.0).all()
+    assert 0.02 < np.mean((loads > 0.05).all(axis=1)) < 0.4
+    assert walked.results[0] == pytest.approx(sum(terms[0] for terms in walked.terms.values()), abs=0.5)
+
+
+def test_candidates_are_single_walks_bit_for_bit(ours) -> None:
+    """Also when one beside falls."""
+    best = ours.best()
+    name = "S00011.vasti.KF"
+    gains = np.array([best[name], 0.0, 1.1 * best[name]])
+    together = ours.walk(best | {name: gains}, 3, duration=1.5)
+    assert together.times[1] < 1.5
+    for k in (0, 1, 2):
+        alone = ours.walk(best | {name: gains[k]}, duration=1.5)
+        assert (alone.times[0], alone.results[0]) == (together.times[k], together.results[k])
+
+
+def test_walks_begin_with_the_weight_that_is_asked_for(ours) -> None:
+    candidates = Candidates(ours, Parameters(ours.best()))
+    assert candidates.walkers.felt().loads.sum() == pytest.approx(0.5, rel=0.1)
+
+
+def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
+    pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
+    from osimlite.reflexes.parameters import read_par
+    from osimlite.reflexes.search import search
+
+    scenario = Scenario(arm)
+    assert [each.name for each in scenario.parameters()] == ["flexor-elbow.KP", "flexor-elbow.C0"]
+    before = scenario.walk({}).results[0]
+    seen = []
+    found = search(scenario, tmp_path / "out", generations=8, population=8, tell=seen.append)
+    assert len(seen) == 8 and seen[-1].best < 0.5 * before
+    assert scenario.walk(found).results[0] == pytest.approx(seen[-1].best, rel=1e-6)
+    assert set(read_par(tmp_path / "out" / "best.par")) == set(found)
+    again = search(Scenario(arm), tmp_path / "out", generations=1, population=8, resume=True)
+    assert set(again) == set(found)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("target = flexor", "target = flexer", "no 'flexer'.*did you mean 'flexor'"),
+        ("KV = 0.3", "KX = 0.3", "'KX' of a DofReflex is not done here"),
+        ("ModelOpenSim4", "ModelHyfydy", "only ModelOpenSim4"),
+        ("ReflexController", "FeedForwardController", "this has FeedForwardController"),
+        ("dof = elbow", "dof = knee", "no coordinate 'knee'"),
+        ("DofMeasure", "BodyMeasure", "a measure is needed"),
+        ("max_duration = 1", "max_duration = long", "must be a number, not 'long'"),
+        ("~2<0,20>", "~x", "must be a number or a parameter"),
+        ("dual_sided = 0", "dual_sided = 0 symetric = 1", "'symetric' of a ReflexController is not done here"),
+    ],
+)
+def test_what_is_not_done_is_refused_by_name(arm, old, new, words) -> None:
+    text = arm.read_text()
+    assert old in text
+    arm.write_text(text.replace(old, new))
+    with pytest.raises(OsimliteError, match=words):
+        Scenario(arm).walk({})
+
+
+def test_gaits_need_legs(arm) -> None:
+    arm.write_text(
+        arm.read_text().replace("DofMeasure { dof = elbow", "GaitMeasure { name = gait #").replace("#", "#\n}#")
+    )
+    with pytest.raises(OsimliteError, match="the model has no legs, which are bodies 'femur_l' and 'femur_r'"):
+        Scenario(arm).walk({})
+
+
+def test_scone_s_human_walks_twenty_seconds() -> None:
+    """By the parameters that are published with it."""
+    name = "scenarios/Examples3/Gait2D - H0918 - OpenSim4.scone"
+    for parent in ROOT.parents:
+        if (file := parent / "pub-scone" / name).is_file():
+            break
+    else:
+        pytest.skip("needs the sources of scone-core, which are not beside this repository")
+    scenario = Scenario(file)
+    walked = scenario.walk(scenario.best())
+    assert walked.times[0] == 20.0 and walked.terms["Gait"][0] == 0.0
+    assert 1.0 < walked.report["speed"][0] < 1.06 and 34 <= walked.report["steps"][0] <= 38
