@@ -1,0 +1,145 @@
+"""Functions of CasADi beside machine code: values, Jacobians, Hessians, and what each takes.
+
+``python benchmarks/derivatives.py FILE.osim ...`` prints a row for each model: kind of the expressions, states, seconds
+to make the functions, the largest difference of the derivative of the state from that of machine code at random states,
+of the Jacobian from extrapolated differences of machine code, of the Hessian of a random combination from extrapolated
+differences of the Jacobian, each over the size of the sums that it is made of; and microseconds of machine code, value,
+Jacobian and Hessian. With ``--opensim`` OpenSim's value, and a Jacobian by forward differences, in microseconds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+STATES, DIRECTIONS, LARGE = 5, 3, 130
+"""How many are tried; of more states there is no Hessian."""
+PATIENCE = 240
+"""S, for one model."""
+OPENSIM = """
+import sys, time, opensim
+opensim.Logger.setLevelString("Off")
+model = opensim.Model(sys.argv[1])
+state = model.initSystem()
+y = state.getY()
+def value():
+    state.setY(y)
+    model.realizeAcceleration(state)
+value()
+start, count = time.perf_counter(), 0
+while time.perf_counter() - start < 1.0:
+    value()
+    count += 1
+print(1e6 * (time.perf_counter() - start) / count, state.getNY())
+"""
+
+
+def measured(path: Path) -> dict[str, Any]:
+    """The numbers of one model."""
+    sys.path.insert(0, str(ROOT))
+    import casadi
+    import numpy as np
+
+    import osimlite
+    from tests.backends.machine import Beside, slope
+
+    before = time.perf_counter()
+    both = Beside(osimlite.read(path))
+    f = both.functions
+    dynamics = f.dynamics
+    row: dict[str, Any] = {"kind": "SX" if dynamics.is_a("SXFunction") else "MX", "states": len(f.states)}
+    row["made"] = time.perf_counter() - before
+    x = both.state(1, 0.03)
+    u = both.controls(x)
+
+    def off(found: Any, wanted: Any, sizes: Any) -> float:
+        return float(np.max(np.abs(found - wanted) / np.maximum(1.0, sizes), initial=0.0))
+
+    seeds = range(STATES)
+    row["value"] = max(off(both.xdot(y), w := both.derivative(y), np.abs(w)) for y in map(both.state, seeds))
+    symbol = casadi.MX.sym("x", len(x))
+    jacobian = casadi.Function("J", [symbol], [casadi.jacobian(dynamics(both.t, symbol, u, f.p), symbol)])
+    a = np.array(jacobian(x).full())
+    ways = [np.random.default_rng(seed).normal(size=len(x)) for seed in range(DIRECTIONS)]
+    ways = [way / np.linalg.norm(way) for way in ways]
+    row["jacobian"] = max(
+        off(slope(lambda h, way=way: both.derivative(x + h * way), 2e-4), a @ way, np.abs(a) @ np.abs(way))
+        for way in ways
+    )
+    timed: dict[str, Callable[[], Any]] = {
+        "machine": lambda: both.derivative(x),
+        "one": lambda: dynamics(both.t, x, u, f.p),
+        "all": lambda: jacobian(x),
+    }
+    if row["kind"] == "SX" and len(x) <= LARGE:
+        push = np.random.default_rng(9).normal(size=len(x))
+        combined = casadi.dot(casadi.DM(push), dynamics(both.t, symbol, u, f.p))
+        hessian = casadi.Function("H", [symbol], [casadi.hessian(combined, symbol)[0]])
+        b = np.array(hessian(x).full())
+        row["hessian"] = max(
+            off(
+                slope(lambda h, way=way: np.array(jacobian(x + h * way).full()).T @ push, 2e-4),
+                b @ way,
+                np.abs(b) @ np.abs(way),
+            )
+            for way in ways
+        )
+        timed["curved"] = lambda: hessian(x)
+    for name, function in timed.items():
+        start, count = time.perf_counter(), 0
+        while time.perf_counter() - start < 0.3:
+            function()
+            count += 1
+        row[f"us_{name}"] = 1e6 * (time.perf_counter() - start) / count
+    return row
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("files", nargs="+", type=Path)
+    parser.add_argument("--opensim", action="store_true")
+    parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
+    chosen = parser.parse_args()
+    if chosen.one:
+        print(json.dumps(measured(chosen.files[0])))
+        return
+    head = ("model", "kind", "states", "made s", "value", "Jacobian", "Hessian", "us code", "value", "Jac.", "Hess.")
+    print("".join(f"{text:>9}" if k else f"{text:<34}" for k, text in enumerate(head)), flush=True)
+    for path in chosen.files:
+        command = [sys.executable, __file__, "--one", str(path)]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE)
+            said = done.stdout.splitlines()[-1] if done.returncode == 0 and done.stdout else ""
+            reason = (done.stderr.strip().splitlines() or ["?"])[-1]
+        except subprocess.TimeoutExpired:
+            said, reason = "", f"not within {PATIENCE} s"
+        name = path.stem[:32]
+        if not said:
+            print(f"{name:<34}{reason.rpartition('Error: ')[2][:100]}", flush=True)
+            continue
+        row = json.loads(said)
+        cells = [row["kind"], row["states"], f"{row['made']:.2f}"]
+        cells += [f"{row[key]:.1e}" if key in row else "-" for key in ("value", "jacobian", "hessian")]
+        cells += [
+            f"{row[f'us_{key}']:.0f}" if f"us_{key}" in row else "-" for key in ("machine", "one", "all", "curved")
+        ]
+        text = "".join(f"{cell:>9}" for cell in cells)
+        if chosen.opensim:
+            theirs = subprocess.run(
+                [sys.executable, "-c", OPENSIM, str(path)], capture_output=True, text=True, check=False
+            )
+            if theirs.returncode == 0:
+                value, size = map(float, theirs.stdout.split())
+                text += f"   OpenSim {value:.0f}, by differences {value * (size + 1):.0f}"
+        print(f"{name:<34}{text}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
