@@ -1,4 +1,4 @@
-"""``osimlite demo``: the whole tour, from a file that is written to three motions in the browser."""
+"""``osimlite demo``: the whole tour, from a file that is written to four motions in the browser."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from osimlite.records import dataclass, replace
 from osimlite.text import listed
 
 if TYPE_CHECKING:
+    from osimlite.reflexes.scenario import Scenario
     from osimlite.simulation.trajectory import Trajectory
 
 MISSPELT = ("<geometry>RFootContact ", "<geometry>RFootContct ")
@@ -43,11 +44,11 @@ def demo(
     pictures: Annotated[bool, Option(help="Draw the plots, and write the pages for the browser.")] = True,
     browser: options.Browser = True,
 ) -> None:
-    """Build, check, translate and simulate: a walker that falls, one that walks, a human who jumps by muscles.
+    """Build, check, translate and simulate: a walker that falls, one that walks, humans who jump and walk by muscles.
 
-    The first is the model of the OpenSim exercise "Building a Dynamic Walker". All three then play in the browser, with
-    the forces of the ground and the muscles in the colours of their activations. The tour takes about five seconds, the
-    first time some twenty, since code is compiled then. It needs no display.
+    The first is the model of the OpenSim exercise "Building a Dynamic Walker". All four then play in the browser, with
+    the forces of the ground and the muscles in the colours of their activations. The tour takes about eight seconds,
+    the first time some twenty, since code is compiled then. It needs no display.
 
     Example: osimlite demo -o tour --no-browser
     """
@@ -62,7 +63,7 @@ def demo(
     pages = _move(tour, pictures)
     say(f"Everything is in {output}{os.sep}")
     if pages:
-        say(f"Look at {pages[-1]}: choose among the three there")
+        say(f"Look at {pages[-1]}: choose among the four there")
         if browser and _has_display():
             import webbrowser
 
@@ -150,23 +151,57 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
             result.append(trajectory)
     if not pictures:
         return []
+    from osimlite.multibody import build_mechanism
     from osimlite.view import Shown, Story, plot_simulation
+
+    human, states, said = _walk(tour)
+    human_title, human_page = "It walks by reflexes", "human-walks.html"
+    human_command = f"osimlite scone {tour.folder}/human-walks/human-walks.scone --optimize --generations 50"
 
     with tour.step("Plot the jump: coordinates, activations, forces, energy") as tell:
         plots = plot_simulation(result[-1], tour.folder / MOTIONS[-1].model)
         tell(f"{len(plots)} pictures", plots[0].with_name("*.png"))
     with tour.step("Write a page for the browser of each motion") as tell:
         pages = []
-        titles = [(motion.title, f"{motion.model}.html") for motion in MOTIONS]
+        titles = [*((motion.title, f"{motion.model}.html") for motion in MOTIONS), (human_title, human_page)]
         for motion, trajectory in zip(MOTIONS, result, strict=True):
             assert trajectory.model is not None
             shown = Shown.of(trajectory.model, trajectory.mechanism, motion=trajectory)
             words = f"{motion.told(trajectory)} {motion.seen}"
             story = Story(words, motion.command.format(tour.folder), f"{motion.model}.html", titles)
             pages.append(shown.write_page(tour.folder / story.page, story))
+        shown = Shown.of(human.model, build_mechanism(human.model), motion=states)
+        pages.append(shown.write_page(tour.folder / human_page, Story(said, human_command, human_page, titles)))
         size = sum(page.stat().st_size for page in pages) / 1e6
         tell(f"{size:.1f} MB; they need no network", *pages)
     return pages
+
+
+def _walk(tour: _Tour) -> tuple[Scenario, Path, str]:
+    """Have the human walk by reflexes; the scenario, the file of the states, and what came out."""
+    import numpy as np
+
+    from osimlite.models.walking import write_scenario
+    from osimlite.reflexes.scenario import Scenario
+    from osimlite.simulation.files.storage import write_sto
+
+    with tour.step("Have a human walk for ten seconds, by reflexes of 16 muscles") as tell:
+        scenario = Scenario(write_scenario(tour.folder / "human-walks"))
+        walked = scenario.walk(scenario.best())
+        file = tour.folder / "human-walks" / "states.sto"
+        table = walked.states
+        write_sto(file, "states", table.times, table.columns, table.rows)
+        speed, steps = walked.report["speed"][0], int(walked.report["steps"][0])
+        peak = float(np.sort(walked.loads.rows[len(table.times) // 2 :].max(axis=1))[-1])
+        mass, t = scenario.walkers(1).mass, walked.times[0]
+        said = (
+            f"A human of {mass:.0f} kg walks for {t:.0f} s at {speed:.2f} m/s, in {steps} steps, by reflexes alone: "
+            "muscles answer to their own lengths and forces, those of the hips to the lean of the torso. A search found "
+            f"how much. The ground carries up to {peak:.1f} times the weight."
+        )
+        tell(said, file)
+        scenario.close()
+    return scenario, file, said
 
 
 def _falls(motion: Trajectory) -> str:
