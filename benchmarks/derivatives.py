@@ -15,6 +15,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -69,10 +70,11 @@ def measured(path: Path) -> dict[str, Any]:
     a = np.array(jacobian(x).full())
     ways = [np.random.default_rng(seed).normal(size=len(x)) for seed in range(DIRECTIONS)]
     ways = [way / np.linalg.norm(way) for way in ways]
-    row["jacobian"] = max(
-        off(slope(lambda h, way=way: both.derivative(x + h * way), 2e-4), a @ way, np.abs(a) @ np.abs(way))
-        for way in ways
-    )
+
+    def along(way: Any, h: float) -> Any:
+        return both.derivative(x + h * way)
+
+    row["jacobian"] = max(off(slope(partial(along, way), 2e-4), a @ way, np.abs(a) @ np.abs(way)) for way in ways)
     timed: dict[str, Callable[[], Any]] = {
         "machine": lambda: both.derivative(x),
         "one": lambda: dynamics(both.t, x, u, f.p),
@@ -83,9 +85,13 @@ def measured(path: Path) -> dict[str, Any]:
         combined = casadi.dot(casadi.DM(push), dynamics(both.t, symbol, u, f.p))
         hessian = casadi.Function("H", [symbol], [casadi.hessian(combined, symbol)[0]])
         b = np.array(hessian(x).full())
+
+        def turned(way: Any, h: float) -> Any:
+            return np.array(jacobian(x + h * way).full()).T @ push
+
         row["hessian"] = max(
             off(
-                slope(lambda h, way=way: np.array(jacobian(x + h * way).full()).T @ push, 2e-4),
+                slope(partial(turned, way), 2e-4),
                 b @ way,
                 np.abs(b) @ np.abs(way),
             )

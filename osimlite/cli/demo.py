@@ -196,8 +196,8 @@ def _walk(tour: _Tour) -> tuple[Scenario, Path, str]:
         mass, t = scenario.walkers(1).mass, walked.times[0]
         said = (
             f"A human of {mass:.0f} kg walks for {t:.0f} s at {speed:.2f} m/s, in {steps} steps, by reflexes alone: "
-            "muscles answer to their own lengths and forces, those of the hips to the lean of the torso. A search found "
-            f"how much. The ground carries up to {peak:.1f} times the weight."
+            "muscles answer to their own lengths and forces, those of the hips to the lean of the torso. A search "
+            f"found how much. The ground carries up to {peak:.1f} times the weight."
         )
         tell(said, file)
         scenario.close()

@@ -9,9 +9,9 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from osimlite.simulation.copies import Copies
 from osimlite.gym.tasks import TASKS, Seen, Task, of_model
 from osimlite.multibody.spatial import Array
+from osimlite.simulation.copies import Copies
 
 FAR = 1e6
 """No observation is larger; what is not finite ends an episode."""

@@ -87,7 +87,7 @@ class Copies:
         """
         batch = self._batch
         self._vectors[:, self._places] = controls
-        # Each step is a run of its own: a method that goes by earlier steps has none, those of other copies least of all.
+        # Each step is a run of its own: a method that goes by earlier steps has none, those of other copies least.
         batch.clocks[:, 0] = 0.0 if rests is None else np.where(rests, self._step, 0.0)
         batch.counts[:] = batch.endings[:] = 0
         if self._pool is None:

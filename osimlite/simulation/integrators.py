@@ -60,7 +60,7 @@ def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: fl
     """Step to try after one of size h, as Simbody chooses it; less than h if and only if error > accuracy.
 
     The estimated error goes with a power of h, so 0.9 h (accuracy / error)^(1/order) should just do. That is taken if
-    it is at least a fifth more or, after a failure, a tenth less; never more than five times nor less than a tenth of h.
+    it is at least a fifth more or, after a failure, a tenth less; never more than five times or less than a tenth of h.
 
     Args:
         h: step just tried, s.

@@ -19,7 +19,7 @@ def test_the_whole_tour(tmp_path: Path) -> None:
     done = run("demo", "-o", "out", folder=tmp_path)
     assert (done.code, done.err) == (0, "")
     folder = tmp_path / "out"
-    names = ["dynamic-walker", "steady-walker", "jumper"]
+    names = ["dynamic-walker", "steady-walker", "jumper", "human-walks"]
     pages = [f"{name}.html" for name in names]
     assert {path.name for path in folder.iterdir()} == {*names, *pages}
     walker = folder / "dynamic-walker"
@@ -36,6 +36,8 @@ def test_the_whole_tour(tmp_path: Path) -> None:
     # What OpenSim's motions and docs/gaits.md say of the other two.
     assert "6 steps in 5 s, at 0.83 m/s" in said
     assert "rises from 0.75 to 1.28 m, and for 0.42 s" in said
+    walked = re.search(r"walks for 10 s at (\S+) m/s, in (\d+) steps, by reflexes alone", said)
+    assert walked is not None and 1.1 < float(walked[1]) < 1.4 and 18 <= int(walked[2]) <= 26
     for page in pages:
         (text,) = re.findall(r'id="data">(.*?)</script>', (folder / page).read_text(encoding="utf-8"))
         story = json.loads(text)["story"]

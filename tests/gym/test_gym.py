@@ -51,7 +51,7 @@ def test_copies_are_single_environments_bit_for_bit(name: str, count: int, integ
         is_over = False
         for action, (observations, rewards, over, late) in zip(actions, found, strict=True):
             if is_over:
-                observation, reward, ended = one.reset()[0], 0.0, (False, False)
+                observation, reward, ended = one.reset()[0], 0.0, [False, False]
             else:
                 observation, reward, *ended, _ = one.step(action[k])
             assert np.array_equal(observation, observations[k]) and reward == rewards[k]

@@ -202,5 +202,5 @@ def test_semi_explicit_steps_are_simbody_s(fixtures, path, until, accuracy):
     assert len(times) == taken + 1
     assert (found.summary["steps"], found.summary["attempted_steps"]) == (taken, attempted)
     own = [*found.values[-1], *found.speeds[-1], *(rows[-1] for rows in found.auxiliary.values())]
-    # Contact makes of every rounding a hundred times as much in a second. Locked coordinates are no states of OpenSim's.
+    # Contact makes a hundred times as much of every rounding in a second. Locked coordinates are no states there.
     assert max(min(abs(here - there) for here in own) for there in last) < 1e-6

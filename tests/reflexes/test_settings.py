@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from osimlite.errors import OsimliteError
@@ -56,7 +57,7 @@ def test_damage_is_told(text, words, tmp_path) -> None:
 )
 def test_parameters(text, mean, std, low, high, tmp_path) -> None:
     (tmp_path / "it.scone").write_text(f"a = {text} b = 2")
-    top, own = read_settings(tmp_path / "it.scone"), Parameters({"S1.a": [0.1, 20.0]}, 2)
+    top, own = read_settings(tmp_path / "it.scone"), Parameters({"S1.a": np.array([0.1, 20.0])}, 2)
     found = own.of(top, "a", 0.0, "S1.a")
     assert found.tolist() == [min(max(value, low), high) for value in (0.1, 20.0)]
     assert own.found["S1.a"] == pytest.approx(("S1.a", mean, std, low, high)[1:], abs=1e-12) or own.found["S1.a"][

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -82,7 +84,7 @@ def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
     scenario = Scenario(arm)
     assert [each.name for each in scenario.parameters()] == ["flexor-elbow.KP", "flexor-elbow.C0"]
     before = scenario.walk({}).results[0]
-    seen = []
+    seen: list[Any] = []
     found = search(scenario, tmp_path / "out", generations=8, population=8, tell=seen.append)
     assert len(seen) == 8 and seen[-1].best < 0.5 * before
     assert scenario.walk(found).results[0] == pytest.approx(seen[-1].best, rel=1e-6)
