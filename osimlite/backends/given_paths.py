@@ -24,8 +24,8 @@ from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.kernels.function_paths import ARMS, DERIVATIVES
-from osimlite.simulation.kernels.layout import ITEM, OUTCOME
-from osimlite.simulation.kernels.paths import LENGTH
+from osimlite.simulation.kernels.layout import ITEM, MODEL, OUTCOME
+from osimlite.simulation.kernels.paths import LENGTH, SPEED
 from osimlite.simulation.path_system import MeasuredPath, PathSystem
 
 STEP = 1e-3
@@ -35,17 +35,27 @@ POSES = 60
 
 
 class GivenPath:
-    """A path of which length and moment arms are symbols.
+    """A path of which length, moment arms and speed are symbols.
+
+    In OpenSim the speed of a path around a surface may be another than its moment arms say.
 
     Args:
         coordinates: places in the mechanism of those that it depends on.
-        symbols: length and a moment arm for each of them, once they are known.
+
+    Attributes:
+        symbols: the length, a moment arm for each coordinate, and what each of their speeds gives to its own, once they
+            are known.
     """
 
     coupled: ClassVar[bool] = False
 
     def __init__(self, coordinates: Sequence[int]) -> None:
         self.coordinates, self.symbols = tuple(coordinates), list[Any]()
+
+    @property
+    def size(self) -> int:
+        """How many symbols there are."""
+        return 1 + 2 * len(self.coordinates)
 
     def items(self, places: Places) -> list[Item]:
         """As of a path that is a function of coordinates; see :mod:`osimlite.simulation.kernels.function_paths`."""
@@ -59,12 +69,19 @@ class GivenPath:
                 record[DERIVATIVES + k] = -self.symbols[1 + k]
             return OUTCOME.OK
 
-        law.takes_symbols = True  # type: ignore[attr-defined]
+        def speed_law(s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> int:
+            rates = zip(self.symbols[1 + count :], freedoms, strict=True)
+            first = s[MODEL.DOFS]
+            w.rest(s[item + ITEM.RECORD])[0] = sum((by * y[first + place] for by, place in rates if place >= 0), 0.0)
+            return OUTCOME.OK
+
+        law.takes_symbols = speed_law.takes_symbols = True  # type: ignore[attr-defined]
         given = Item("", room=DERIVATIVES + count, is_part=True, python=taken(law))
-        pull = Item("pull_coordinates", is_part=True)
-        backs = [sum(ITEM.OWN + len(item.ints) for item in parts) for parts in ((pull, given), (given,))]
-        ints = backs[0], count, backs[1], 0, *freedoms, *[0] * count
-        return [pull, given, Item("function_path", ints, room=ARMS + count, is_part=True)]
+        speed = Item("", room=1, is_part=True, python=taken(speed_law))
+        before = [Item("pull_coordinates", is_part=True), given, speed]
+        backs = [sum(ITEM.OWN + len(item.ints) for item in before[first:]) for first in range(3)]
+        ints = backs[0], count, backs[1], backs[2], *freedoms, *[0] * count
+        return [*before, Item("function_path", ints, room=ARMS + count, is_part=True)]
 
 
 class SearchedPaths:
@@ -93,10 +110,21 @@ class SearchedPaths:
         arms = np.abs(self._system.pulled(poses)).max(axis=0) if owners else np.zeros((0, len(self._still)))
         moved = [[k for k in self._order if row[k] > 0.0] for row in arms]
         self.given = [GivenPath(coordinates) for coordinates in moved]
-        self.size = sum(1 + len(item.coordinates) for item in self.given)
+        self._groups = _apart(moved)
+        self.size = sum(item.size for item in self.given)
         others = {item.path: given for item, given in zip(owners, self.given, strict=True)}
         elements = (replace(e, place=others[e.path]) if e.path in others else e for e in forces.elements)
         self.forces = replace(forces, elements=tuple(elements))
+
+    def _speeds(self, pose: Array) -> list[Array]:
+        """Of each path what a speed of 1 of each of its coordinates gives to its own."""
+        result = np.zeros((len(self.given), len(pose)))
+        for group in self._groups:
+            moving = np.zeros(len(pose))
+            moving[group] = 1.0
+            # No path has two of these coordinates.
+            result[:, group] = self._system.measured(pose, moving, SPEED)[:, None]
+        return [row[[*item.coordinates]] for row, item in zip(result, self.given, strict=True)]
 
     def _poses(self, mechanism: Mechanism) -> Array:
         rng = np.random.default_rng(0)
@@ -109,7 +137,7 @@ class SearchedPaths:
         """Have the paths be symbols (size,)."""
         first = 0
         for item in self.given:
-            item.symbols = [symbols[first + k] for k in range(1 + len(item.coordinates))]
+            item.symbols = [symbols[first + k] for k in range(item.size)]
             first += len(item.symbols)
 
     def measured(self, q: Array) -> Array:
@@ -118,15 +146,23 @@ class SearchedPaths:
         pose[self._order] = q
         lengths = self._system.measured(pose, self._still, LENGTH)
         (arms,) = self._system.pulled(pose[None])
-        parts = zip(lengths, arms, self.given, strict=True)
-        return np.concatenate([np.append(length, row[[*item.coordinates]]) for length, row, item in parts])
+        speeds = self._speeds(pose)
+        parts = zip(lengths, arms, speeds, self.given, strict=True)
+        return np.concatenate(
+            [np.concatenate([[length], arm[[*item.coordinates]], speed]) for length, arm, speed, item in parts]
+        )
 
     def slopes(self, q: Array) -> Array:
         """Derivatives (size, n) of `measured`."""
         result = np.zeros((self.size, len(q)))
-        for k in range(len(q)):
-            one, two = ([self.measured(_moved(q, k, sign * h)) for sign in (1, -1)] for h in (STEP, 2.0 * STEP))
-            result[:, k] = (8.0 * (one[0] - one[1]) - (two[0] - two[1])) / (12.0 * STEP)
+        owners = np.repeat(np.arange(len(self.given)), [item.size for item in self.given])
+        for group in self._groups:
+            columns = [self._order.index(place) for place in group]
+            one, two = ([self.measured(_moved(q, columns, sign * h)) for sign in (1, -1)] for h in (STEP, 2.0 * STEP))
+            slope = (8.0 * (one[0] - one[1]) - (two[0] - two[1])) / (12.0 * STEP)
+            for place, column in zip(group, columns, strict=True):
+                own = np.array([place in item.coordinates for item in self.given])[owners]
+                result[own, column] = slope[own]
         return result
 
     @property
@@ -135,7 +171,7 @@ class SearchedPaths:
         places = {place: k for k, place in enumerate(self._order)}
         rows, columns, first = list[int](), list[int](), 0
         for item in self.given:
-            count = 1 + len(item.coordinates)
+            count = item.size
             for row in range(first, first + count):
                 rows += [row] * len(item.coordinates)
                 columns += [places[coordinate] for coordinate in item.coordinates]
@@ -149,10 +185,23 @@ class SearchedPaths:
         return _Called("path_lengths", [len(self._order)], dense, self.measured, slopes)
 
 
-def _moved(q: Array, k: int, by: float) -> Array:
+def _moved(q: Array, places: Sequence[int], by: float) -> Array:
     result = q.copy()
-    result[k] += by
+    result[places] += by
     return result
+
+
+def _apart(paths: Sequence[Sequence[int]]) -> list[list[int]]:
+    """The coordinates of some paths in groups of which no path has two, so that all of a group can move at once."""
+    groups: list[list[int]] = []
+    for place in dict.fromkeys(place for own in paths for place in own):
+        beside = {other for own in paths if place in own for other in own}
+        group = next((each for each in groups if not beside & {*each}), None)
+        if group is None:
+            groups.append([place])
+        else:
+            group.append(place)
+    return groups
 
 
 def _is_searched(element: Any) -> bool:
