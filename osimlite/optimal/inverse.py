@@ -71,7 +71,7 @@ def problem_of_inverse(
     if tool.minimize_sum_squared_activations:
         phase.goals.append(MocoSumSquaredStateGoal(name="activation_effort", pattern=".*activation$"))
     table, motion = _kinematics(asked, tool, model)
-    set_times(asked, tool, table, phase, solver)
+    set_times(asked, tool, [table], phase, solver)
     if more is not None:
         more(study)
     return Problem(study, file, folder, motion=motion)

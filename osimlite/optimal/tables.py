@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from osimlite.errors import DocumentError
+from osimlite.fitting.marker_data import MarkerData
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.smoothing_spline import SampledCurves
@@ -51,7 +53,7 @@ def processed_table(
     """The table as its processor makes it, given the paths of states; errors as of :func:`table_of`."""
     if not processor.filepath.strip():
         raise problem.wrong(part, "it names no table")
-    table = read_sto(problem.place(processor.filepath))
+    table = _read(problem.place(processor.filepath))
     for operator in processor.operators:
         if isinstance(operator, TabOpLowPassFilter):
             table = _filtered(table, operator)
@@ -60,6 +62,15 @@ def processed_table(
         else:
             raise problem.refused(operator, "this operator on tables is not applied here")
     return replace(_in_radians(table, mechanism), header={"inDegrees": "no"})
+
+
+def _read(path: Path) -> StoTable:
+    """A table; of a file of markers three columns for each, as OpenSim flattens them, m."""
+    if path.suffix.lower() != ".trc":
+        return read_sto(path)
+    markers = MarkerData.of(path)
+    labels = tuple(f"{name}_{k}" for name in markers.names for k in (1, 2, 3))
+    return StoTable("", markers.times, labels, markers.positions.reshape(len(markers.times), -1), file=str(path))
 
 
 def _filtered(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:

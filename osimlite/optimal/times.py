@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from osimlite.optimal.asked import Asked
 from osimlite.schema.moco.parts import MocoFinalBounds, MocoInitialBounds
@@ -11,14 +12,19 @@ from osimlite.simulation.files.storage import StoTable
 
 
 def set_times(
-    asked: Asked, tool: MocoInverse | MocoTrack, table: StoTable, phase: MocoPhase, solver: MocoCasADiSolver
+    asked: Asked,
+    tool: MocoInverse | MocoTrack,
+    tables: Sequence[StoTable],
+    phase: MocoPhase,
+    solver: MocoCasADiSolver,
 ) -> tuple[float, float]:
     """Set bounds of time and the mesh by the settings of a tool, and return the first and the last time, s.
 
     Raises:
-        DocumentError: the table has no data between the times of the tool.
+        DocumentError: the tables have no data between the times of the tool.
     """
-    first, last = float(table.times[0]), float(table.times[-1])
+    first = max(float(table.times[0]) for table in tables)
+    last = min(float(table.times[-1]) for table in tables)
     start = first if tool.initial_time is None else tool.initial_time
     end = last if tool.final_time is None else tool.final_time
     if not first <= start < end <= last:

@@ -20,7 +20,8 @@ from osimlite.records import replace
 from osimlite.schema.moco.goals import MocoControlGoal
 from osimlite.schema.moco.parts import MocoWeight, MocoWeightSet
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoPhase, MocoProblem, MocoStudy, MocoTrack
-from osimlite.schema.moco.tracking import MocoStateTrackingGoal
+from osimlite.schema.moco.tracking import MocoMarkerTrackingGoal, MocoStateTrackingGoal
+from osimlite.schema.tools.inverse_kinematics import MarkersReference, MarkerWeight, MarkerWeightSet
 from osimlite.schema.tools.processors import ModelProcessor
 from osimlite.simulation.files.storage import StoTable
 
@@ -43,7 +44,7 @@ def problem_of_track(
         more: changes the study before it becomes a problem: goals, bounds, settings of the solver.
 
     Raises:
-        UnsupportedError: markers are to be followed, or something else that is not done here.
+        UnsupportedError: there is something that is not done here.
         OsimliteError: the settings or their files are not as they have to be.
     """
     place = file.parent if file is not None else folder or Path(".")
@@ -57,23 +58,27 @@ def problem_of_track(
     study = MocoStudy(name=tool.name, problem=MocoProblem(name="problem", phases=phase), solver=solver)
     # The names of states and where errors are told of are those of a problem that has no goals yet.
     bare = Problem(study, file, place)
+    tables: dict[str, StoTable] = {}
+    states, mechanism = bare.functions.states, bare.functions.mechanism
+    if tool.states_reference.filepath.strip():
+        table = processed_table(bare, tool.states_reference, tool.states_reference, states, mechanism)
+        if tool.track_reference_position_derivatives:
+            table = _with_speeds(table)
+        tables["state_tracking"] = table
+        phase.goals.append(
+            MocoStateTrackingGoal(
+                name="state_tracking",
+                weight=tool.states_global_tracking_weight,
+                allow_unused_references=tool.allow_unused_references,
+                scale_weights_with_range=tool.scale_state_weights_with_range,
+                state_weights=MocoWeightSet(name="state_weights", objects=_weights(bare, tool, table)),
+            )
+        )
     if tool.markers_reference.filepath.strip():
-        raise bare.refused(tool.markers_reference, "markers are not followed here yet")
-    if not tool.states_reference.filepath.strip():
-        raise bare.wrong(tool, "it has nothing to follow; give it a states_reference")
-    table = processed_table(
-        bare, tool.states_reference, tool.states_reference, bare.functions.states, bare.functions.mechanism
-    )
-    if tool.track_reference_position_derivatives:
-        table = _with_speeds(table)
-    goal = MocoStateTrackingGoal(
-        name="state_tracking",
-        weight=tool.states_global_tracking_weight,
-        allow_unused_references=tool.allow_unused_references,
-        scale_weights_with_range=tool.scale_state_weights_with_range,
-        state_weights=MocoWeightSet(name="state_weights", objects=_weights(bare, tool, table)),
-    )
-    phase.goals.append(goal)
+        tables["marker_tracking"] = processed_table(bare, tool.markers_reference, tool.markers_reference, (), mechanism)
+        phase.goals.append(_marker_goal(tool))
+    if not tables:
+        raise bare.wrong(tool, "it has nothing to follow; give it a states_reference or a markers_reference")
     if tool.minimize_control_effort:
         weights = [weight.copy_deep() for weight in tool.controls_weight_set.objects]
         phase.goals.append(
@@ -83,14 +88,15 @@ def problem_of_track(
                 control_weights=MocoWeightSet(name="control_weights", objects=weights),
             )
         )
-    first, last = set_times(bare, tool, table, phase, solver)
+    first, last = set_times(bare, tool, [*tables.values()], phase, solver)
     if more is not None:
         more(study)
     guess = None
     if tool.guess_file.strip():
         guess = MocoTrajectory.read(bare.place(tool.guess_file))
-    problem = Problem(study, file, place, {"state_tracking": table})
-    if tool.apply_tracked_states_to_guess:
+    problem = Problem(study, file, place, tables)
+    if tool.apply_tracked_states_to_guess and "state_tracking" in tables:
+        table = tables["state_tracking"]
         # Moco takes the rows one after the other from the first time to the last, whenever they were measured.
         times = np.linspace(first, last, len(table.times))
         states = {name: table[name] for name in table.columns if name in problem.states}
@@ -120,6 +126,20 @@ def track(
     """
     problem, guess = problem_of_track(tool, None, None if folder is None else Path(folder), more)
     return solved(Program(problem), guess, tell)
+
+
+def _marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:
+    """What follows markers; one without a weight counts 1."""
+    weights = [MarkerWeight(name=item.name, weight=item.weight) for item in tool.markers_weight_set.objects]
+    reference = MarkersReference(
+        name="markers_reference", marker_weights=MarkerWeightSet(name="marker_weights", objects=weights)
+    )
+    return MocoMarkerTrackingGoal(
+        name="marker_tracking",
+        weight=tool.markers_global_tracking_weight,
+        allow_unused_references=tool.allow_unused_references,
+        markers_reference=reference,
+    )
 
 
 def _with_speeds(table: StoTable) -> StoTable:

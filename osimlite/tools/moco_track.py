@@ -19,6 +19,8 @@ def run(job: Job, outcome: Outcome) -> None:
     problem, guess = problem_of_track(job.setup, job.file)
     solution = solved(Program(problem), guess, told)
     name = job.setup.name or "MocoTrack"
-    outcome.new_table(job.result(f"{name}_tracked_states.sto"), problem.tables["state_tracking"])
+    for goal, what in (("state_tracking", "states"), ("marker_tracking", "markers")):
+        if goal in problem.tables:
+            outcome.new_table(job.result(f"{name}_tracked_{what}.sto"), problem.tables[goal])
     outcome.new_table(job.result(f"{name}_solution.sto"), solution.trajectory.table())
     report(solution, outcome)

@@ -73,8 +73,8 @@ def test_what_tools_do_not_do_is_refused(example):
     tool.final_time = 3.0
     with pytest.raises(osimlite.OsimliteError, match=r"from 0 s to 3 s there are no data; they are from 0 s to 0.47"):
         problem_of_track(tool, folder=Path(example))
-    tool.markers_reference.filepath = "markers.trc"
-    with pytest.raises(osimlite.OsimliteError, match="markers are not followed here yet"):
+    tool.states_reference.filepath = ""
+    with pytest.raises(osimlite.OsimliteError, match="give it a states_reference or a markers_reference"):
         problem_of_track(tool, folder=Path(example))
 
 

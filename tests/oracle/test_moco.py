@@ -71,19 +71,77 @@ def test_markers_controls_and_bounds_over_time(tmp_path):
     )
     text = guess.read_text().partition("endheader")[2]
     guess.write_text(f"inDegrees=no\n{counts}num_states=4\nDataType=double\nversion=3\nendheader{text}")
-    said = []
-    for command in (["-m", "tests.oracle.moco_goals"], ["-c", OURS]):
-        done = subprocess.run(
-            [sys.executable, *command],
-            cwd=tmp_path,
-            env=os.environ | {"PYTHONPATH": str(ROOT)},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stdout + done.stderr
-        said.append(json.loads(done.stdout.splitlines()[-1]))
+    said = [_said(tmp_path, command) for command in (["-m", "tests.oracle.moco_goals"], ["-c", OURS])]
     theirs, (terms, missed, objective, success) = said
     assert terms == pytest.approx(theirs, rel=1e-10)
     assert missed < 1e-6 and success
     assert objective <= sum(theirs.values()) * (1.0 + 1e-6)
+
+
+TRACKED = """
+import json
+import opensim as osim
+osim.Logger.setLevelString("Off")
+tool = osim.MocoTrack()
+tool.setName("t")
+tool.setModel(osim.ModelProcessor("model.osim"))
+tool.setMarkersReferenceFromTRC("markers.trc")
+tool.set_markers_global_tracking_weight(3.0)
+weights = osim.MocoWeightSet()
+weights.cloneAndAppend(osim.MocoWeight("tip", 2.0))
+tool.set_markers_weight_set(weights)
+tool.set_mesh_interval(0.1)
+study = tool.initialize()
+osim.MocoCasADiSolver.safeDownCast(study.updSolver()).set_optim_max_iterations(5)
+solution = study.solve()
+solution.unseal()
+solution.write("theirs.sto")
+names = solution.getObjectiveTermNames()
+print(json.dumps({name: solution.getObjectiveTermByIndex(place) for place, name in enumerate(names)}))
+"""
+OUR_TRACKED = """
+import json
+import osimlite
+from osimlite import moco
+from osimlite.optimal.program import Program
+lowpass = osimlite.TabOpLowPassFilter(cutoff_frequency=6.0)
+tool = osimlite.MocoTrack(
+    name="t",
+    model=osimlite.ModelProcessor(filepath="model.osim"),
+    markers_reference=osimlite.TableProcessor(filepath="markers.trc", operators=[lowpass]),
+    markers_global_tracking_weight=3.0,
+    mesh_interval=0.1,
+)
+tool.markers_weight_set.objects.append(osimlite.MocoWeight(name="tip", weight=2.0))
+problem, _ = moco.problem_of_track(tool)
+print(json.dumps(moco.evaluated(Program(problem), moco.MocoTrajectory.read("theirs.sto"))[0]))
+"""
+
+
+def test_tracked_markers(tmp_path):
+    """After five of its iterations Moco's costs are those that are found here."""
+    osim = pytest.importorskip("opensim")
+    model = osim.ModelFactory.createDoublePendulum()
+    for name, body in (("tip", 1), ("elbow", 0)):
+        model.addMarker(osim.Marker(name, model.getBodySet().get(body), osim.Vec3(0.1, 0.05, 0.02)))
+    model.finalizeConnections()
+    model.printToXML(str(tmp_path / "model.osim"))
+    t = np.linspace(0.0, 1.0, 31)
+    places = np.stack([np.cos(2 * t), np.sin(2 * t), 0.01 * t, np.sin(t), 0.5 * t, 0.0 * t], axis=1)
+    write_trc(tmp_path / "markers.trc", t.tolist(), ("tip", "elbow"), places.tolist())
+    theirs, ours = (_said(tmp_path, ["-c", code]) for code in (TRACKED, OUR_TRACKED))
+    assert ours == pytest.approx(theirs, rel=1e-10)
+
+
+def _said(folder, command):
+    """What a program prints last."""
+    done = subprocess.run(
+        [sys.executable, *command],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return json.loads(done.stdout.splitlines()[-1])

@@ -3,32 +3,29 @@
 from __future__ import annotations
 
 from osimlite.backends.symbols import casadi
-from osimlite.fitting.marker_data import MarkerData
 from osimlite.optimal.point import Formula, Point, Terms, integral
 from osimlite.optimal.problem import Problem
-from osimlite.optimal.tables import splines
+from osimlite.optimal.tables import processed_table, splines
 from osimlite.schema.markers import Marker
 from osimlite.schema.moco.tracking import MocoMarkerTrackingGoal
-from osimlite.simulation.files.storage import StoTable
+from osimlite.schema.tools.processors import TableProcessor
 
 
 def terms(goal: MocoMarkerTrackingGoal, problem: Problem) -> Terms:
     """The integral of the weighted sum of squares of the markers' distances from splines through what was measured."""
-    reference = goal.markers_reference
-    if not reference.marker_file.strip():
-        raise problem.wrong(goal, "its markers_reference names no marker_file")
-    measured = MarkerData.of(problem.place(reference.marker_file))
+    reference, table = goal.markers_reference, problem.tables.get(goal.name)
+    if table is None:
+        processor = TableProcessor(name="markers", filepath=reference.marker_file)
+        table = processed_table(problem, goal, processor, (), problem.functions.mechanism)
+    measured = [*dict.fromkeys(label[:-2] for label in table.columns)]
     known = {part.name: path for path, part in problem.components.items() if isinstance(part, Marker)}
     known |= {path: path for path in known.values()}
-    followed = [name for name in measured.names if name in known or not goal.allow_unused_references]
+    followed = [name for name in measured if name in known or not goal.allow_unused_references]
     for name in followed:
         problem.expect(goal, name, known, "marker")
     own = {item.name: item.weight for item in reference.marker_weights.objects}
     weights = [own.get(name, reference.default_weight) for name in followed]
-    labels = [f"{name}|{axis}" for name in followed for axis in "xyz"]
-    places = [measured.names.index(name) for name in followed]
-    rows = measured.positions[:, places].reshape(len(measured.times), -1)
-    table = StoTable("", measured.times, tuple(labels), rows, file=reference.marker_file)
+    labels = [f"{name}_{k}" for name in followed for k in (1, 2, 3)]
     series = splines(problem, table, labels)
 
     def integrand(point: Point) -> Formula:
