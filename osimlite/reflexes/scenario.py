@@ -17,7 +17,7 @@ from osimlite.reflexes.measures import MEASURES, Measure
 from osimlite.reflexes.parameters import Parameter, Parameters, read_par
 from osimlite.reflexes.settings import Node, found_file, read_settings
 from osimlite.reflexes.walkers import Felt, Walkers
-from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.text import listed, or_known
 
 OPTIMIZERS = "CmaOptimizer", "CmaPoolOptimizer"
@@ -215,6 +215,12 @@ class Candidates:
 
     def _read_state(self, path: Path) -> None:
         walkers = self.walkers
+        if path.suffix.lower() == ".sto":
+            table = read_sto(path)
+            for label in table.columns:
+                if label in walkers.places and len(table.times):
+                    walkers.copies.states[:, walkers.places[label]] = table[label][0]
+            return
         top = read_settings(path)
         for block, ending in (("values", "value"), ("velocities", "speed")):
             part = top.get(block)

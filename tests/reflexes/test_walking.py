@@ -76,6 +76,21 @@ def test_walks_begin_with_the_weight_that_is_asked_for(ours) -> None:
     assert candidates.walkers.felt().loads.sum() == pytest.approx(0.5, rel=0.1)
 
 
+def test_a_file_of_states_is_a_start(tmp_path) -> None:
+    from osimlite.simulation.files.storage import write_sto
+
+    file = write_scenario(tmp_path)
+    first = Scenario(file)
+    states = first.walk(first.best(), duration=0.05).states
+    write_sto(tmp_path / "start.sto", "states", states.times, states.columns, states.rows)
+    text = file.read_text().replace("human-walks.zml", "start.sto").replace("initial_load = 0.5", "initial_load = 0")
+    file.write_text(text.replace("initial_state_offset = 0~0.05<-1,1>", ""))
+    again = Scenario(file)
+    start = again.walk(again.best(), duration=0.01).states
+    values = [label for label in states.columns if label.endswith("/value")]
+    assert [start[label][0] for label in values] == pytest.approx([states[label][0] for label in values], abs=1e-9)
+
+
 def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
     pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
     from osimlite.reflexes.parameters import read_par
