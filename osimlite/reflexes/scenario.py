@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.document.reader import read
-from osimlite.errors import SimulationError
+from osimlite.errors import SettingError, SimulationError
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.reflexes.controllers import CONTROLLERS, Reflexes
@@ -151,7 +151,12 @@ class Scenario:
             count: of candidates.
             duration: s; that of the scenario if None.
             tell: is told the time that was reached, s.
+
+        Raises:
+            SettingError: the duration is shorter than a control step.
         """
+        if duration is not None and not duration >= self.step:
+            raise SettingError(f"a walk of {duration:g} s is shorter than a control step of {self.step:g} s")
         candidates = Candidates(self, Parameters(values, count))
         return candidates.walk(self.duration if duration is None else duration, tell)
 

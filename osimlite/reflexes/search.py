@@ -17,6 +17,8 @@ from osimlite.reflexes.parameters import Parameter, read_par
 from osimlite.reflexes.scenario import Scenario
 
 BEST = "best.par"
+FEWEST = 4
+"""Candidates that CMA-ES learns anything from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +70,10 @@ def search(
 
     Raises:
         MissingDependency: cma is not installed.
-        SettingError: nothing is looked for.
+        SettingError: nothing is looked for, or there are too few candidates.
     """
+    if population < FEWEST or generations < 1:
+        raise SettingError(f"a search takes {FEWEST} candidates in a generation at least, and one generation")
     strategy = require("cma", extra="optimize", purpose="the search for parameters")
     own = scenario.parameters()
     if not own:

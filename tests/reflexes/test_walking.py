@@ -130,6 +130,16 @@ def test_what_is_not_done_is_refused_by_name(arm, old, new, words) -> None:
         Scenario(arm).walk({})
 
 
+def test_settings_without_sense(ours, tmp_path) -> None:
+    pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
+    from osimlite.reflexes.search import search
+
+    with pytest.raises(OsimliteError, match="shorter than a control step"):
+        ours.walk({}, duration=0.0)
+    with pytest.raises(OsimliteError, match="4 candidates in a generation"):
+        search(ours, tmp_path, population=1)
+
+
 def test_gaits_need_legs(arm) -> None:
     arm.write_text(
         arm.read_text().replace("DofMeasure { dof = elbow", "GaitMeasure { name = gait #").replace("#", "#\n}#")
