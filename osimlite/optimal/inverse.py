@@ -17,14 +17,14 @@ from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
 from osimlite.optimal.solution import MocoSolution, solved
 from osimlite.optimal.tables import Curves, expect_columns, processed_table
-from osimlite.optimal.times import set_times
+from osimlite.optimal.tool_study import set_times, study_of
 from osimlite.records import replace
 from osimlite.schema.moco.goals import MocoControlGoal, MocoInitialActivationGoal, MocoSumSquaredStateGoal
 from osimlite.schema.moco.parts import MocoWeight, MocoWeightSet
-from osimlite.schema.moco.studies import MocoCasADiSolver, MocoInverse, MocoPhase, MocoProblem, MocoStudy
+from osimlite.schema.moco.studies import MocoCasADiSolver, MocoInverse, MocoStudy
 from osimlite.schema.model import Model
-from osimlite.schema.tools.processors import ModelProcessor
 from osimlite.simulation.files.storage import StoTable
+from osimlite.text import did_you_mean
 
 AUXILIARY_WEIGHT = 0.01
 """Of the squares of rates of tendon forces."""
@@ -62,8 +62,8 @@ def problem_of_inverse(
     )
     if tool.max_iterations is not None:
         solver.optim_max_iterations = tool.max_iterations
-    phase = MocoPhase(name="phases", model=ModelProcessor(name="model", model=model))
-    study = MocoStudy(name=tool.name, problem=MocoProblem(name="problem", phases=phase), solver=solver)
+    study = study_of(tool, model, solver)
+    phase = study.problem.phases
     reserves = MocoWeight(name=".*/reserve_.*", weight=tool.reserves_weight)
     effort = MocoControlGoal(name="excitation_effort")
     effort.control_weights_pattern = MocoWeightSet(name="control_weights_pattern", objects=[reserves])
@@ -71,10 +71,19 @@ def problem_of_inverse(
     if tool.minimize_sum_squared_activations:
         phase.goals.append(MocoSumSquaredStateGoal(name="activation_effort", pattern=".*activation$"))
     table, motion = _kinematics(asked, tool, model)
-    set_times(asked, tool, [table], phase, solver)
+    set_times(asked, tool, [table], study)
     if more is not None:
         more(study)
-    return Problem(study, file, folder, motion=motion)
+    problem = Problem(study, file, folder, motion=motion)
+    if not tool.kinematics_allow_extra_columns:
+        known = (*problem.functions.inserted(table.times[:1]), *problem.functions.states)
+        for label in table.columns:
+            if label not in known:
+                near = did_you_mean(label, known)
+                raise asked.wrong(
+                    tool, f"'{label}' is no state{near}; set kinematics_allow_extra_columns to leave it out"
+                )
+    return problem
 
 
 def inverse(
@@ -95,12 +104,13 @@ def inverse(
     Raises:
         OsimliteError: as of :func:`problem_of_inverse`.
     """
-    return solved(Program(problem_of_inverse(tool, None, None if folder is None else Path(folder), more)), None, tell)
+    return solved_inverse(problem_of_inverse(tool, None, None if folder is None else Path(folder), more), tell)
 
 
-def with_motion(problem: Problem, solution: MocoSolution) -> MocoSolution:
-    """A solution with the values and speeds of the motion that was given."""
+def solved_inverse(problem: Problem, tell: Callable[[Progress], None] | None) -> MocoSolution:
+    """The solution of the problem of the tool, with the values and speeds of the motion that was given."""
     given: GivenMotion = problem.functions
+    solution = solved(Program(problem), None, tell)
     trajectory = solution.trajectory
     states = given.inserted(trajectory.times)
     names = trajectory.names | {"states": (*states, *trajectory.names["states"])}

@@ -53,7 +53,7 @@ def processed_table(
     """The table as its processor makes it, given the paths of states; errors as of :func:`table_of`."""
     if not processor.filepath.strip():
         raise problem.wrong(part, "it names no table")
-    table = _read(problem.place(processor.filepath))
+    table = read_table(problem.place(processor.filepath))
     for operator in processor.operators:
         if isinstance(operator, TabOpLowPassFilter):
             table = _filtered(table, operator)
@@ -64,7 +64,7 @@ def processed_table(
     return replace(_in_radians(table, mechanism), header={"inDegrees": "no"})
 
 
-def _read(path: Path) -> StoTable:
+def read_table(path: Path) -> StoTable:
     """A table; of a file of markers three columns for each, as OpenSim flattens them, m."""
     if path.suffix.lower() != ".trc":
         return read_sto(path)

@@ -14,15 +14,14 @@ from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
 from osimlite.optimal.solution import MocoSolution, solved
 from osimlite.optimal.tables import processed_table
-from osimlite.optimal.times import set_times
+from osimlite.optimal.tool_study import set_times, study_of
 from osimlite.optimal.trajectory import MocoTrajectory
 from osimlite.records import replace
 from osimlite.schema.moco.goals import MocoControlGoal
 from osimlite.schema.moco.parts import MocoWeight, MocoWeightSet
-from osimlite.schema.moco.studies import MocoCasADiSolver, MocoPhase, MocoProblem, MocoStudy, MocoTrack
+from osimlite.schema.moco.studies import MocoCasADiSolver, MocoStudy, MocoTrack
 from osimlite.schema.moco.tracking import MocoMarkerTrackingGoal, MocoStateTrackingGoal
 from osimlite.schema.tools.inverse_kinematics import MarkersReference, MarkerWeight, MarkerWeightSet
-from osimlite.schema.tools.processors import ModelProcessor
 from osimlite.simulation.files.storage import StoTable
 
 HALF_ORDER = 3
@@ -54,8 +53,8 @@ def problem_of_track(
         optim_constraint_tolerance=1e-2,
         optim_finite_difference_scheme="forward",
     )
-    phase = MocoPhase(name="phases", model=ModelProcessor(name="model", model=processed(tool.model, place)))
-    study = MocoStudy(name=tool.name, problem=MocoProblem(name="problem", phases=phase), solver=solver)
+    study = study_of(tool, processed(tool.model, place), solver)
+    phase = study.problem.phases
     # The names of states and where errors are told of are those of a problem that has no goals yet.
     bare = Problem(study, file, place)
     tables: dict[str, StoTable] = {}
@@ -88,7 +87,7 @@ def problem_of_track(
                 control_weights=MocoWeightSet(name="control_weights", objects=weights),
             )
         )
-    first, last = set_times(bare, tool, [*tables.values()], phase, solver)
+    first, last = set_times(bare, tool, [*tables.values()], study)
     if more is not None:
         more(study)
     guess = None

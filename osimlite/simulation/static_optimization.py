@@ -193,15 +193,22 @@ class StaticOptimization:
         Raises:
             SimulationError: the forces cannot be computed at one of the states.
         """
-        system, order = self._system, list(self._system.order)
-        udot, ways = self._allowed(times, values, speeds, accelerations)
-        moments = np.column_stack([times, system.state.rows(values, speeds)])
-        needed, pushes, strengths = system.pushed(moments, np.ascontiguousarray(udot[:, order]), self._paths)
-        turned = ways[:, order]
-        needed = (needed[:, None, :] @ turned)[:, 0]
-        result, lacking, solved = self._least(pushes @ turned, needed)
+        allowed, ways = self._allowed(times, values, speeds, accelerations)
+        needed, pushes, strengths = self._asked(times, values, speeds, allowed, ways)
+        result, lacking, solved = self._least(pushes, needed)
         result[~solved] = np.nan
         return Shared(times, self.names, result, strengths * self.optimal_forces, self.coordinates, lacking, solved)
+
+    def _asked(
+        self, times: Array, values: Array, speeds: Array, accelerations: Array, ways: Array
+    ) -> tuple[Array, Array, Array]:
+        """What the coordinates of `coordinates` need (t, m), what a control of 1 of each actuator gives them (t, a, m),
+        and the forces of muscles (t, a), 1 of others; `ways` is what moves with each of these coordinates."""
+        system, order = self._system, list(self._system.order)
+        moments = np.column_stack([times, system.state.rows(values, speeds)])
+        needed, pushes, strengths = system.pushed(moments, np.ascontiguousarray(accelerations[:, order]), self._paths)
+        turned = ways[:, order]
+        return (needed[:, None, :] @ turned)[:, 0], pushes @ turned, strengths
 
     def _least(self, columns: Array, needed: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         return least_effort(columns, needed, self._exponent, self._bounds)
@@ -221,12 +228,9 @@ class StaticOptimization:
 
     def balanced(self, times: Array, values: Array, speeds: Array, accelerations: Array) -> Array:
         """Forces (t, a), within no bounds, that give accelerations (t, n) with the least squares of controls."""
-        system, order = self._system, list(self._system.order)
-        udot, ways = self._allowed(times, values, speeds, accelerations)
-        moments = np.column_stack([times, system.state.rows(values, speeds)])
-        needed, pushes, _ = system.pushed(moments, np.ascontiguousarray(udot[:, order]), self._paths)
-        turned = ways[:, order]
-        shared = np.linalg.pinv((pushes @ turned).transpose(0, 2, 1)) @ (needed[:, None, :] @ turned).transpose(0, 2, 1)
+        allowed, ways = self._allowed(times, values, speeds, accelerations)
+        needed, pushes, _ = self._asked(times, values, speeds, allowed, ways)
+        shared = np.linalg.pinv(pushes.transpose(0, 2, 1)) @ needed[:, :, None]
         result: Array = shared[..., 0] * self.optimal_forces
         return result
 
@@ -235,13 +239,9 @@ class StaticOptimization:
 
         The accelerations (t, n) are taken as they are, whether the constraints allow them or not.
         """
-        system, order = self._system, list(self._system.order)
         _, ways = self._allowed(times, values, speeds, accelerations)
-        moments = np.column_stack([times, system.state.rows(values, speeds)])
-        needed, pushes, _ = system.pushed(moments, np.ascontiguousarray(accelerations[:, order]), self._paths)
-        turned = ways[:, order]
-        each = pushes / self.optimal_forces[:, None]
-        return (needed[:, None, :] @ turned)[:, 0], (each @ turned).transpose(0, 2, 1)
+        needed, pushes, _ = self._asked(times, values, speeds, accelerations, ways)
+        return needed, (pushes / self.optimal_forces[:, None]).transpose(0, 2, 1)
 
     def path_lengths(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array]:
         """Lengths (m) and lengthening speeds (m/s) of the muscles' paths (t, a); 1 and 0 of other actuators."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.tools.job import Job
-from osimlite.tools.moco_study import report
+from osimlite.tools.moco_study import report, telling
 from osimlite.tools.not_runnable import NotRunnable
 from osimlite.tools.outcome import Outcome
 
@@ -11,16 +11,11 @@ from osimlite.tools.outcome import Outcome
 def run(job: Job, outcome: Outcome) -> None:
     """Find what the muscles do, and write it beside the setup."""
     # CasADi is loaded with it.
-    from osimlite.optimal.inverse import problem_of_inverse, with_motion
-    from osimlite.optimal.program import Program
-    from osimlite.optimal.solution import solved
+    from osimlite.optimal.inverse import problem_of_inverse, solved_inverse
 
     if job.setup.output_paths:
         message = "output_paths is given, and outputs of the solution are not computed here; leave it empty"
         raise NotRunnable(message, file=str(job.file))
-    says = outcome.progress
-    told = None if says is None else (lambda progress: says(str(progress)))
-    problem = problem_of_inverse(job.setup, job.file)
-    solution = with_motion(problem, solved(Program(problem), None, told))
+    solution = solved_inverse(problem_of_inverse(job.setup, job.file), telling(outcome))
     outcome.new_table(job.result(f"{job.setup.name or 'MocoInverse'}_solution.sto"), solution.trajectory.table())
     report(solution, outcome)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
 
 if TYPE_CHECKING:
+    from osimlite.optimal.ipopt import Progress
     from osimlite.optimal.solution import MocoSolution
 
 
@@ -19,11 +21,16 @@ def run(job: Job, outcome: Outcome) -> None:
     from osimlite.optimal.solution import solved
 
     study = job.setup
-    says = outcome.progress if study.solver.verbosity > 0 else None
-    told = None if says is None else (lambda progress: says(str(progress)))
-    solution = solved(Program(Problem(study, job.file)), None, told)
+    tell = telling(outcome) if study.solver.verbosity > 0 else None
+    solution = solved(Program(Problem(study, job.file)), None, tell)
     outcome.new_table(job.in_results(f"{study.name or 'MocoStudy'}_solution.sto"), solution.trajectory.table())
     report(solution, outcome)
+
+
+def telling(outcome: Outcome) -> Callable[[Progress], None] | None:
+    """What tells of each iteration, if somebody listens."""
+    says = outcome.progress
+    return None if says is None else (lambda progress: says(str(progress)))
 
 
 def report(solution: MocoSolution, outcome: Outcome) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.tools.job import Job
-from osimlite.tools.moco_study import report
+from osimlite.tools.moco_study import report, telling
 from osimlite.tools.outcome import Outcome
 
 
@@ -14,10 +14,8 @@ def run(job: Job, outcome: Outcome) -> None:
     from osimlite.optimal.solution import solved
     from osimlite.optimal.track import problem_of_track
 
-    says = outcome.progress
-    told = None if says is None else (lambda progress: says(str(progress)))
     problem, guess = problem_of_track(job.setup, job.file)
-    solution = solved(Program(problem), guess, told)
+    solution = solved(Program(problem), guess, telling(outcome))
     name = job.setup.name or "MocoTrack"
     for goal, what in (("state_tracking", "states"), ("marker_tracking", "markers")):
         if goal in problem.tables:

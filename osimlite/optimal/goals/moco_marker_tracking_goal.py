@@ -5,18 +5,18 @@ from __future__ import annotations
 from osimlite.backends.symbols import casadi
 from osimlite.optimal.point import Formula, Point, Terms, integral
 from osimlite.optimal.problem import Problem
-from osimlite.optimal.tables import processed_table, splines
+from osimlite.optimal.tables import read_table, splines
 from osimlite.schema.markers import Marker
 from osimlite.schema.moco.tracking import MocoMarkerTrackingGoal
-from osimlite.schema.tools.processors import TableProcessor
 
 
 def terms(goal: MocoMarkerTrackingGoal, problem: Problem) -> Terms:
     """The integral of the weighted sum of squares of the markers' distances from splines through what was measured."""
     reference, table = goal.markers_reference, problem.tables.get(goal.name)
     if table is None:
-        processor = TableProcessor(name="markers", filepath=reference.marker_file)
-        table = processed_table(problem, goal, processor, (), problem.functions.mechanism)
+        if not reference.marker_file.strip():
+            raise problem.wrong(goal, "its markers_reference names no marker_file")
+        table = read_table(problem.place(reference.marker_file))
     measured = [*dict.fromkeys(label[:-2] for label in table.columns)]
     known = {part.name: path for path, part in problem.components.items() if isinstance(part, Marker)}
     known |= {path: path for path in known.values()}

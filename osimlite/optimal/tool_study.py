@@ -1,4 +1,4 @@
-"""When the motions of Moco's tools begin and end."""
+"""The studies that Moco's tools make: their parts, and when they begin and end."""
 
 from __future__ import annotations
 
@@ -7,16 +7,20 @@ from collections.abc import Sequence
 
 from osimlite.optimal.asked import Asked
 from osimlite.schema.moco.parts import MocoFinalBounds, MocoInitialBounds
-from osimlite.schema.moco.studies import MocoCasADiSolver, MocoInverse, MocoPhase, MocoTrack
+from osimlite.schema.moco.studies import MocoCasADiSolver, MocoInverse, MocoPhase, MocoProblem, MocoStudy, MocoTrack
+from osimlite.schema.model import Model
+from osimlite.schema.tools.processors import ModelProcessor
 from osimlite.simulation.files.storage import StoTable
 
 
+def study_of(tool: MocoInverse | MocoTrack, model: Model, solver: MocoCasADiSolver) -> MocoStudy:
+    """A study of a model that is processed, without goals."""
+    phase = MocoPhase(name="phases", model=ModelProcessor(name="model", model=model))
+    return MocoStudy(name=tool.name, problem=MocoProblem(name="problem", phases=phase), solver=solver)
+
+
 def set_times(
-    asked: Asked,
-    tool: MocoInverse | MocoTrack,
-    tables: Sequence[StoTable],
-    phase: MocoPhase,
-    solver: MocoCasADiSolver,
+    asked: Asked, tool: MocoInverse | MocoTrack, tables: Sequence[StoTable], study: MocoStudy
 ) -> tuple[float, float]:
     """Set bounds of time and the mesh by the settings of a tool, and return the first and the last time, s.
 
@@ -30,9 +34,11 @@ def set_times(
     if not first <= start < end <= last:
         message = f"from {start:g} s to {end:g} s there are no data; they are from {first:g} s to {last:g} s"
         raise asked.wrong(tool, message)
-    solver.num_mesh_intervals = math.ceil((end - start) / tool.mesh_interval)
+    assert isinstance(study.solver, MocoCasADiSolver)
+    study.solver.num_mesh_intervals = math.ceil((end - start) / tool.mesh_interval)
     if tool.clip_time_range:
         start, end = start + 1e-3, end - 1e-3
+    phase = study.problem.phases
     phase.time_initial_bounds = MocoInitialBounds(name="time_initial_bounds", bounds=(start,))
     phase.time_final_bounds = MocoFinalBounds(name="time_final_bounds", bounds=(end,))
     return start, end
