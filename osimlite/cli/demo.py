@@ -149,12 +149,12 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
                 write(simulation.model, folder / f"{simulation.model.name}.osim")
                 tell(motion.told(trajectory), folder)
             result.append(trajectory)
+    human, states, said = _walk(tour)
     if not pictures:
         return []
     from osimlite.multibody import build_mechanism
     from osimlite.view import Shown, Story, plot_simulation
 
-    human, states, said = _walk(tour)
     human_title, human_page = "It walks by reflexes", "human-walks.html"
     human_command = f"osimlite scone {tour.folder}/human-walks/human-walks.scone --optimize --generations 50"
 
@@ -179,8 +179,6 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
 
 def _walk(tour: _Tour) -> tuple[Scenario, Path, str]:
     """Have the human walk by reflexes; the scenario, the file of the states, and what came out."""
-    import numpy as np
-
     from osimlite.models.walking import write_scenario
     from osimlite.reflexes.scenario import Scenario
     from osimlite.simulation.files.storage import write_sto
@@ -192,7 +190,7 @@ def _walk(tour: _Tour) -> tuple[Scenario, Path, str]:
         table = walked.states
         write_sto(file, "states", table.times, table.columns, table.rows)
         speed, steps = walked.report["speed"][0], int(walked.report["steps"][0])
-        peak = float(np.sort(walked.loads.rows[len(table.times) // 2 :].max(axis=1))[-1])
+        peak = float(walked.loads.rows[len(table.times) // 2 :].max())
         mass, t = scenario.walkers(1).mass, walked.times[0]
         said = (
             f"A human of {mass:.0f} kg walks for {t:.0f} s at {speed:.2f} m/s, in {steps} steps, by reflexes alone: "

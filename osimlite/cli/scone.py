@@ -28,9 +28,16 @@ def scone(
         ),
     ] = None,
     optimize: Annotated[bool, Option("--optimize", help="Look for better ones.")] = False,
-    generations: Annotated[int, Option(metavar="N", help="How many.")] = 1000,
-    population: Annotated[int, Option(metavar="N", help="Candidates of each generation.")] = 16,
-    seed: Annotated[int, Option(help="The same seed, the same search.")] = 0,
+    generations: Annotated[
+        int | None, Option(metavar="N", help="How many.", show_default="what the scenario says, or 1000")
+    ] = None,
+    population: Annotated[
+        int | None,
+        Option(metavar="N", help="Candidates of each generation.", show_default="what the scenario says, or 16"),
+    ] = None,
+    seed: Annotated[
+        int | None, Option(help="The same seed, the same search.", show_default="what the scenario says, or 0")
+    ] = None,
     duration: Annotated[
         float | None, Option("--to", metavar="SECONDS", help="Length of a walk.", show_default="that of the scenario")
     ] = None,

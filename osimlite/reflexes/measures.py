@@ -5,6 +5,7 @@ Each class of measures is one class here, found by its name.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
@@ -49,7 +50,7 @@ class Mean:
         return np.divide(self.total, self.span, out=self._value.copy(), where=self.span > 0.0)
 
 
-class Measure:
+class Measure(ABC):
     """One measure.
 
     Args:
@@ -60,6 +61,8 @@ class Measure:
     Attributes:
         name: of it.
         failed: which candidates it has ended (w,).
+        report: what it says besides.
+        terms: what it and those that it is made of add, by their names.
     """
 
     def __init__(self, node: Node, walkers: Walkers, side: str = "") -> None:
@@ -78,6 +81,7 @@ class Measure:
             raise node.error("measures that are to be large are not done here")
         self.failed = np.zeros(self.count, dtype=bool)
         self.report: dict[str, Array] = {}
+        self.terms: dict[str, Array] = {}
         self.read(node)
         node.expect_all_asked(f"a {type(self).__name__}", tuple(MEASURES))
 
@@ -85,33 +89,37 @@ class Measure:
         """Of one that has none."""
         return type(self).__name__
 
+    @abstractmethod
     def read(self, node: Node) -> None:
         """Read what the class adds."""
 
     def begin(self, felt: Felt) -> None:
         """At the start."""
+        self.failed[:] = False
 
+    @abstractmethod
     def note(self, t: float, felt: Felt, excitations: Array, going: Mask) -> None:
         """At the end of a control step (s), of those that are going (w,)."""
 
+    @abstractmethod
     def result(self, times: Array, duration: float) -> Array:
         """The measure (w,), of walks that ended at times (w,) before or at a duration, s."""
-        raise NotImplementedError
 
     def counted(self, t: float, felt: Felt, excitations: Array, going: Mask) -> None:
         """As `note`, if the measure is on."""
         if t >= self.start and (self.stop == 0.0 or t < self.stop):
             self.note(t, felt, excitations, going)
 
-    def weighted(self, times: Array, duration: float, terms: dict[str, Array]) -> Array:
-        """What it adds to the sum (w,); noted by its name in `terms`."""
+    def weighted(self, times: Array, duration: float) -> Array:
+        """What it adds to the sum (w,), noted in `terms`."""
         value = self.result(times, duration) + self.offset
         if self.threshold is not None:
             least, over = self.threshold, self.transition
             between = value * (value - least) / over if over > 0.0 else value
             value = np.where(value < least, 0.0, np.where(value < least + over, between, value))
         found: Array = self.weight * value
-        terms[self.name] = found
+        # One that is made of others has theirs.
+        self.terms = self.terms or {self.name: found}
         return found
 
 
@@ -143,11 +151,11 @@ class GaitMeasure(Measure):
 
     def begin(self, felt: Felt) -> None:
         """As `Measure` says."""
-        self._start = self._before = self._distance(felt)
+        self._before = self._distance(felt)
         self._height = felt.centre[:, 1].copy()
         self._touched: Mask | None = None
         self._steps: list[list[tuple[float, float]]] = [[] for _ in range(self.count)]
-        self._here = self._start
+        self._here = self._before.copy()
 
     def note(self, t: float, felt: Felt, excitations: Array, going: Mask) -> None:
         """As `Measure` says."""
@@ -162,14 +170,11 @@ class GaitMeasure(Measure):
         self._touched = touches
 
     def _add(self, k: int, t: float) -> None:
-        if not self._steps[k]:
-            self._before = self._before.copy()
         self._steps[k].append((t, float(self._here[k] - self._before[k])))
         self._before[k] = self._here[k]
 
     def result(self, times: Array, duration: float) -> Array:
         """As `Measure` says."""
-        self._before = self._before.copy()
         result, speeds = np.ones(self.count), np.zeros(self.count)
         wanted = max(min(abs(self.low), abs(self.high)), self.least_speed)
         for k in range(self.count):
@@ -366,14 +371,13 @@ class CompositeMeasure(Measure):
             part.counted(t, felt, excitations, going)
             self.failed |= part.failed
 
-    def weighted(self, times: Array, duration: float, terms: dict[str, Array]) -> Array:
+    def result(self, times: Array, duration: float) -> Array:
         """As `Measure` says."""
-        own: dict[str, Array] = {}
-        total = sum((part.weighted(times, duration, own) for part in self.parts), np.zeros(self.count))
-        terms.update(own)
+        total = sum((part.weighted(times, duration) for part in self.parts), np.zeros(self.count))
         for part in self.parts:
+            self.terms |= part.terms
             self.report |= part.report
-        return self.weight * total
+        return total
 
 
 MEASURES: dict[str, Any] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,18 @@ from osimlite.text import listed, or_known
 
 OPTIMIZERS = "CmaOptimizer", "CmaPoolOptimizer"
 INTEGRATORS = {"SemiExplicitEuler2": "euler2", "RungeKuttaMerson": "merson"}
+POPULATION, GENERATIONS = 16, 1000
+"""Of a search whose scenario says nothing."""
+LEFT_ASIDE = (
+    "signature_prefix",
+    "signature_postfix",
+    "name",
+    "output_root",
+    "min_progress",
+    "window_size",
+    "max_threads",
+)
+"""Settings of a search that change no result, or only when SCONE ends it."""
 HIGH, CLOSE, TRIES = 10.0, 0.1, 100
 """How far a walker is lifted or lowered at most to carry its weight (m), how well it has to carry it, and tries."""
 LIFT = 0.1
@@ -63,6 +75,7 @@ class Scenario:
         measure: name and part of what judges.
         begun: parameters that a file of the scenario begins with: best, mean and standard deviation.
         duration: of a walk, s.
+        population, generations, seed: of a search.
 
     Raises:
         DocumentError: it has something that is not done here; its name and line are told.
@@ -74,6 +87,7 @@ class Scenario:
         top = read_settings(self.path)
         found = next(iter(top.all_of(*OPTIMIZERS)), None)
         self.optimizer = top if found is None else found[1]
+        self.population, self.generations, self.seed = POPULATION, GENERATIONS, 0
         objective = self.optimizer.get("SimulationObjective")
         if objective is None:
             raise self.optimizer.error("a scenario needs a SimulationObjective in a CmaOptimizer")
@@ -83,10 +97,17 @@ class Scenario:
         if settings is None:
             other = next((name for name, _ in objective.parts if name.startswith("Model")), "no model")
             raise objective.error(f"of models only ModelOpenSim4 is done here, and this has {other}")
-        self._settings: Node = settings
+        self.settings: Node = settings
         self.model = read(found_file(settings.text("model_file"), self.folder))
         self.step = settings.number("fixed_control_step_size", 0.005)
         self.begun = self._begun()
+        if found is not None:
+            self.population = int(self.optimizer.number("lambda", POPULATION))
+            self.generations = int(self.optimizer.number("max_generations", GENERATIONS))
+            self.seed = int(self.optimizer.number("random_seed", 0))
+            for key in LEFT_ASIDE:
+                self.optimizer.get(key)
+            self.optimizer.expect_all_asked(f"a {found[0]}")
         self._walkers: dict[int, Walkers] = {}
         self._refuse()
 
@@ -96,10 +117,11 @@ class Scenario:
             own = read_par(found_file(init.text("file"), self.folder))
             factor, best = init.number("std_factor", 1.0), init.flag("use_best_as_mean", False)
             result |= {name: (v[0], v[0] if best else v[1], factor * v[2]) for name, v in own.items()}
+            init.expect_all_asked("an init")
         return result
 
     def _refuse(self) -> None:
-        objective, settings = self._objective, self._settings
+        objective, settings = self._objective, self.settings
         for key in ("initial_load_dof", "state_init_file", "integration_method", "integration_accuracy", "initial_load",
                     "initial_state_offset", "initial_state_offset_exclude", "initial_state_offset_include",
                     "initial_state_offset_symmetric", "leg_upper_body", "leg_lower_body", "leg_contact_force",
@@ -142,7 +164,6 @@ class Scenario:
         count: int = 1,
         *,
         duration: float | None = None,
-        tell: Callable[[float], None] | None = None,
     ) -> Walked:
         """Have candidates walk until they fall, or to the end.
 
@@ -150,7 +171,6 @@ class Scenario:
             values: of the parameters, of each candidate (w,) or one for all.
             count: of candidates.
             duration: s; that of the scenario if None.
-            tell: is told the time that was reached, s.
 
         Raises:
             SettingError: the duration is shorter than a control step.
@@ -158,12 +178,12 @@ class Scenario:
         if duration is not None and not duration >= self.step:
             raise SettingError(f"a walk of {duration:g} s is shorter than a control step of {self.step:g} s")
         candidates = Candidates(self, Parameters(values, count))
-        return candidates.walk(self.duration if duration is None else duration, tell)
+        return candidates.walk(self.duration if duration is None else duration)
 
     def walkers(self, count: int) -> Walkers:
         """So many walkers of the model; kept, as making them takes longer than a walk."""
         if count not in self._walkers:
-            node = self._settings
+            node = self.settings
             self._walkers[count] = Walkers(
                 self.model.copy_deep(),
                 count,
@@ -173,6 +193,7 @@ class Scenario:
                 node.text("leg_upper_body", "femur"),
                 node.text("leg_lower_body", ""),
                 node.text("leg_contact_force", "foot"),
+                node.number("max_integration_step_size", np.inf),
             )
         return self._walkers[count]
 
@@ -197,7 +218,7 @@ class Candidates:
 
     def _start(self) -> None:
         """States at the start, in which the ground carries what it is to carry."""
-        walkers, node, scenario = self.walkers, self.scenario._settings, self.scenario
+        walkers, node, scenario = self.walkers, self.scenario.settings, self.scenario
         states = walkers.copies.states
         walkers.copies.put(slice(None), np.tile(walkers.copies.start, (walkers.count, 1)))
         file = node.text("state_init_file", "")
@@ -238,11 +259,11 @@ class Candidates:
                 except ValueError:
                     raise node.error(f"'{name}' must be a number, not '{node.value}'") from None
 
-    def walk(self, duration: float, tell: Callable[[float], None] | None) -> Walked:
+    def walk(self, duration: float) -> Walked:
         """As of `Scenario.walk`."""
         walkers, controller, measure = self.walkers, self.controller, self.measure
         most = np.ones(len(walkers.names))
-        small = self.scenario._settings.number("initial_equilibration_activation", 0.05)
+        small = self.scenario.settings.number("initial_equilibration_activation", 0.05)
         walkers.equilibrated(np.full((walkers.count, len(most)), small))
         felt = walkers.felt()
         controller.begin(felt)
@@ -263,14 +284,11 @@ class Candidates:
             going &= good
             measure.counted(t, felt, excitations, going)
             going &= ~measure.failed
-            if tell is not None and number % round(1.0 / walkers.step) == 0:
-                tell(t)
             if not going.any():
                 break
         rows.append((float(times[0]), felt.states[0].copy(), excitations[0], felt.loads[0]))
-        terms: dict[str, Array] = {}
-        results = measure.weighted(times, duration, terms)
-        return Walked(results, times, terms, measure.report, *self._tables(rows))
+        results = measure.weighted(times, duration)
+        return Walked(results, times, measure.terms, measure.report, *self._tables(rows))
 
     def _tables(self, rows: Sequence[tuple[float, Array, Array, Array]]) -> tuple[StoTable, StoTable, StoTable]:
         walkers = self.walkers

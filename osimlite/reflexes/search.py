@@ -48,9 +48,9 @@ def search(
     scenario: Scenario,
     folder: str | Path,
     *,
-    generations: int = 1000,
-    population: int = 16,
-    seed: int = 0,
+    generations: int | None = None,
+    population: int | None = None,
+    seed: int | None = None,
     resume: bool = False,
     tell: Callable[[Generation], None] | None = None,
 ) -> dict[str, float]:
@@ -59,7 +59,7 @@ def search(
     Args:
         scenario: whose.
         folder: for ``best.par``, which SCONE reads, too.
-        generations: how many.
+        generations: how many; as the scenario says if None, as the next two.
         population: candidates of each.
         seed: the same seed, the same search.
         resume: whether it begins with the file that is in the folder.
@@ -72,6 +72,9 @@ def search(
         MissingDependency: cma is not installed.
         SettingError: nothing is looked for, or there are too few candidates.
     """
+    generations = scenario.generations if generations is None else generations
+    population = scenario.population if population is None else population
+    seed = scenario.seed if seed is None else seed
     if population < FEWEST or generations < 1:
         raise SettingError(f"a search takes {FEWEST} candidates in a generation at least, and one generation")
     strategy = require("cma", extra="optimize", purpose="the search for parameters")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -79,6 +80,7 @@ class Walkers:
         upper: name of the bodies of upper legs, without the side.
         lower: of feet; empty for those two below.
         contact: of the forces of feet.
+        longest: of the integrator's own steps, s.
 
     Raises:
         ModelError: it has actuators that are no muscles.
@@ -94,9 +96,10 @@ class Walkers:
         upper: str = "femur",
         lower: str = "",
         contact: str = "foot",
+        longest: float = inf,
     ) -> None:
         self.count, self.step = count, step
-        self.copies = Copies(model, count, step, accuracy, integrator)
+        self.copies = Copies(model, count, step, accuracy, integrator, longest)
         self.engine: Any = self.copies.engine
         self.mechanism = self.copies.simulation.mechanism
         tree = self.copies.simulation.model.tree()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -32,13 +33,16 @@ class Copies:
         step: length of a step, s.
         accuracy: of the integrator.
         integrator: which.
+        longest: of the integrator's own steps, s.
 
     Attributes:
         states: of all copies (w, y), in the order of the engine; they are changed in place.
         controls: names of the actuators, in the order in which controls are given.
     """
 
-    def __init__(self, model: Model, count: int, step: float, accuracy: float, integrator: str) -> None:
+    def __init__(
+        self, model: Model, count: int, step: float, accuracy: float, integrator: str, longest: float = inf
+    ) -> None:
         self.simulation = simulation = Simulation(model, "compiled")
         engine: Any = simulation.engine
         self.engine = engine
@@ -49,7 +53,7 @@ class Copies:
         self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
         self._places = self._places_of(driven)
         self._step = step
-        options = BatchOptions(to=step, accuracy=accuracy, integrator=integrator)
+        options = BatchOptions(to=step, accuracy=accuracy, integrator=integrator, step_bounds=(0.0, longest))
         options.check()
         vectors = np.tile(engine.numbers, (count, 1))
         self._batch = Batch(engine, np.tile(self.start, (count, 1)), options, vectors=vectors, start_holds=True)

@@ -53,6 +53,12 @@ def test_ours_costs_no_more(tmp_path):
     assert found.success
     assert found.objective <= moco_said(NAME)["objective"] * (1.0 + 1e-4)
     assert found.iterations < moco_said(NAME)["iterations"]
+    assert "/jointset/hip_r/hip_flexion_r/value" in found.states.columns
+
+
+def test_columns_that_are_no_states_must_be_allowed(tmp_path):
+    with pytest.raises(OsimliteError, match=r"is no state.*set kinematics_allow_extra_columns"):
+        problem_of_inverse(squat(tmp_path, kinematics_allow_extra_columns=False), folder=tmp_path)
 
 
 def test_setups_are_run_and_tell_the_motion_too(tmp_path):

@@ -119,6 +119,7 @@ def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
         ("DofMeasure", "BodyMeasure", "a measure is needed"),
         ("max_duration = 1", "max_duration = long", "must be a number, not 'long'"),
         ("~2<0,20>", "~x", "must be a number or a parameter"),
+        ("SimulationObjective", "lamda = 4 SimulationObjective", "'lamda' of a CmaOptimizer is not.*mean 'lambda'"),
         ("dual_sided = 0", "dual_sided = 0 symetric = 1", "'symetric' of a ReflexController is not done here"),
     ],
 )
@@ -138,6 +139,18 @@ def test_settings_without_sense(ours, tmp_path) -> None:
         ours.walk({}, duration=0.0)
     with pytest.raises(OsimliteError, match="4 candidates in a generation"):
         search(ours, tmp_path, population=1)
+
+
+def test_the_scenario_says_how_to_search_and_step(arm) -> None:
+    text = arm.read_text().replace(
+        "SimulationObjective", "lambda = 6 random_seed = 3 min_progress = 1 SimulationObjective"
+    )
+    arm.write_text(text.replace("initial_load = 0", "initial_load = 0 max_integration_step_size = 0.0001"))
+    scenario = Scenario(arm)
+    assert (scenario.population, scenario.seed) == (6, 3)
+    scenario.walk({}, duration=0.005)
+    (counts,) = scenario.walkers(1).copies._batch.counts[:, :1]
+    assert counts[0] == 50
 
 
 def test_gaits_need_legs(arm) -> None:

@@ -4,10 +4,36 @@ from __future__ import annotations
 
 from math import inf, isfinite, sqrt
 
-from osimlite.simulation.integrators import weight
+from osimlite.simulation.integrators import next_step_size, weight
 from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, OUTCOME, WORK
-from osimlite.simulation.kernels.method import ACCEPTED, COUNTED_Q, COUNTED_U
+from osimlite.simulation.kernels.method import (
+    ACCEPTED,
+    COUNTED_Q,
+    COUNTED_U,
+    LAST_TIME,
+    LONGEST,
+    NEXT_STEP,
+    REACHED,
+    SHORTEST,
+)
 from osimlite.simulation.kernels.pointers import Floats, Ints, call
+
+
+def step_end(h: Floats) -> float:
+    """Where a step leads to. One that all but reaches the limit goes there."""
+    t0, limit, step = h[REACHED], h[LAST_TIME], h[NEXT_STEP]
+    return limit if limit <= t0 + 1.001 * step else t0 + step
+
+
+def judge(h: Floats, t1: float, error: float, order: float) -> None:
+    """Take or leave a step to t1 by its error of an order, and choose the next one."""
+    limit, step, accuracy = h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED]
+    # A step cut much shorter tells nothing about the next.
+    cut = limit < h[REACHED] + 0.95 * step
+    h[NEXT_STEP] = min(max(next_step_size(step, error, accuracy, cut, order), h[SHORTEST]), h[LONGEST])
+    # The shortest step that is allowed is taken whatever its error, as in Simbody.
+    if error <= accuracy or (step <= h[SHORTEST] and error < inf):
+        h[REACHED] = t1
 
 
 def projected(

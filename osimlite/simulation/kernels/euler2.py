@@ -8,21 +8,9 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from osimlite.simulation.integrators import next_step_size
-from osimlite.simulation.kernels.error_control import error_norm, projected
+from osimlite.simulation.kernels.error_control import error_norm, judge, projected, step_end
 from osimlite.simulation.kernels.layout import LINK, MODEL, MOTION, OPERATION, OUTCOME, STAGE, WORK
-from osimlite.simulation.kernels.method import (
-    ACCEPTED,
-    ERRORS,
-    EVALUATED,
-    HAS_DERIVATIVE,
-    LAST_TIME,
-    LONGEST,
-    MEMORY,
-    NEXT_STEP,
-    REACHED,
-    SHORTEST,
-)
+from osimlite.simulation.kernels.method import ACCEPTED, ERRORS, EVALUATED, HAS_DERIVATIVE, MEMORY, REACHED
 from osimlite.simulation.kernels.parts import link_ints, operation_ints
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
@@ -36,23 +24,18 @@ def euler2(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) ->
     h = at(w, place)
     size = s[MODEL.STATE_SIZE]
     errors, whole = at(w, s[MODEL.WORK_STATE] + ERRORS * size), at(h, HEAD)
-    t0, limit, step, accuracy = h[REACHED], h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED]
-    t1 = limit if limit <= t0 + 1.001 * step else t0 + step
+    t0, t1, tolerance = h[REACHED], step_end(h), h[ACCEPTED] / 10.0
     h[EVALUATED], h[HAS_DERIVATIVE] = 1.0, 0.0
     error = inf
     if halved(s, x, w, t0, t1, y0, y1, whole, at(whole, size)) == OUTCOME.OK:
         for k in range(size):
             errors[k] = y1[k] - whole[k]
         # As in Simbody, whatever the error is, and the error is left as it is.
-        tolerance = accuracy / 10.0
         if s[MODEL.CONSTRAINED] == 0 or projected(
             s, x, w, t1, y1, errors, 0, tolerance, max(2.0 * tolerance, sqrt(tolerance))
         ):
             error = error_norm(s, y0, errors, h, 0)
-    cut = limit < t0 + 0.95 * step
-    h[NEXT_STEP] = min(max(next_step_size(step, error, accuracy, cut, ORDER), h[SHORTEST]), h[LONGEST])
-    if error <= accuracy or (step <= h[SHORTEST] and error < inf):
-        h[REACHED] = t1
+    judge(h, t1, error, ORDER)
     return OUTCOME.OK
 
 

@@ -4,21 +4,9 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.simulation.integrators import next_step_size
-from osimlite.simulation.kernels.error_control import step_error
+from osimlite.simulation.kernels.error_control import judge, step_end, step_error
 from osimlite.simulation.kernels.layout import MODEL, OUTCOME, STAGE, WORK
-from osimlite.simulation.kernels.method import (
-    ACCEPTED,
-    ERRORS,
-    EVALUATED,
-    HAS_DERIVATIVE,
-    LAST_TIME,
-    LONGEST,
-    MEMORY,
-    NEXT_STEP,
-    REACHED,
-    SHORTEST,
-)
+from osimlite.simulation.kernels.method import ERRORS, EVALUATED, HAS_DERIVATIVE, MEMORY, REACHED
 from osimlite.simulation.kernels.pointers import Floats, Ints, at, call
 
 HEAD, STATES, IS_IMPLICIT = MEMORY + 1, 3, False
@@ -30,18 +18,12 @@ def merson(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) ->
     """Try one step from y0, behind which its derivative stands, to y1."""
     h = at(w, place)
     errors, stages = at(w, s[MODEL.WORK_STATE] + ERRORS * s[MODEL.STATE_SIZE]), at(h, HEAD)
-    t0, limit, step, accuracy = h[REACHED], h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED]
-    # A step that all but reaches the limit goes there. One cut much shorter tells nothing about the next.
-    t1 = limit if limit <= t0 + 1.001 * step else t0 + step
+    t0, t1 = h[REACHED], step_end(h)
     h[EVALUATED], h[HAS_DERIVATIVE] = 4.0, 0.0
     error = inf
     if staged(s, x, w, t0, t1, y0, y1, errors, stages) == OUTCOME.OK:
         error = step_error(s, x, w, t1, y0, y1, errors, h, 0)
-    cut = limit < t0 + 0.95 * step
-    h[NEXT_STEP] = min(max(next_step_size(step, error, accuracy, cut, ORDER), h[SHORTEST]), h[LONGEST])
-    # The shortest step that is allowed is taken whatever its error, as in Simbody.
-    if error <= accuracy or (step <= h[SHORTEST] and error < inf):
-        h[REACHED] = t1
+    judge(h, t1, error, ORDER)
     return OUTCOME.OK
 
 
