@@ -1,0 +1,117 @@
+"""Humans that walk by reflexes: seconds of walking a second, beside OpenSim with the same excitations and integrator.
+
+    python benchmarks/reflexes.py [SCENARIO.scone] [SECONDS]
+
+Without a scenario our own human walks. Each is run three times in turn; the medians are shown. OpenSim moves the model
+by a PrescribedController that holds what the reflexes said, from the same start: it only integrates.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from osimlite.models.walking import write_scenario
+from osimlite.reflexes.scenario import Scenario
+
+CANDIDATES, TIMES = 16, 3
+OPENSIM = """
+import json, sys, time, opensim
+opensim.Logger.setLevelString("Off")
+given = json.load(open(sys.argv[1]))
+model = opensim.Model(given["model"])
+brain = opensim.PrescribedController()
+model.addController(brain)
+for label, values in given["excitations"].items():
+    brain.addActuator(model.getMuscles().get(label))
+    function = opensim.PiecewiseConstantFunction()
+    for row, value in enumerate(values):
+        function.addPoint(row * given["step"] - 1e-12, value)
+    brain.prescribeControlForActuator(label, function)
+state = model.initSystem()
+for name, value in given["start"].items():
+    model.setStateVariableValue(state, name, value)
+manager = opensim.Manager(model)
+manager.setIntegratorMethod(opensim.Manager.IntegratorMethod_SemiExplicitEuler2)
+manager.setIntegratorAccuracy(1e-3)
+manager.initialize(state)
+before = time.perf_counter()
+for row in range(1, given["rows"] + 1):
+    manager.integrate(row * given["step"])
+print(time.perf_counter() - before)
+"""
+
+
+def main(file: Path, seconds: float) -> None:
+    """Print a table in Markdown."""
+    scenario = Scenario(file)
+    best = scenario.best()
+    walked = scenario.walk(best, duration=seconds)
+    walkers, spent = scenario.walkers(1), [0.0, 0]
+    step = walkers.copies.step
+
+    def timed(*given: object) -> object:
+        before = time.perf_counter()
+        result = step(*given)  # type: ignore[arg-type]
+        spent[0] += time.perf_counter() - before
+        spent[1] += int(walkers.copies._batch.counts[0, 2])
+        return result
+
+    walkers.copies.step = timed  # type: ignore[assignment,method-assign]
+    scenario.walk(best, CANDIDATES, duration=0.1)
+    own, alone, many, theirs = [], [], [], []
+    with tempfile.TemporaryDirectory() as folder:
+        from osimlite.document.printer import write
+
+        model, given = Path(folder) / "model.osim", Path(folder) / "given.json"
+        write(scenario.model, model)
+        rows = len(walked.states.times) - 1
+        told = {
+            "model": str(model),
+            "step": scenario.step,
+            "rows": rows,
+            "start": {name: walked.states[name][0] for name in walked.states.columns},
+            "excitations": {name: walked.excitations[name][:rows].tolist() for name in walked.excitations.columns},
+        }
+        given.write_text(json.dumps(told))
+        for _ in range(TIMES):
+            spent[:] = 0.0, 0
+            before = time.perf_counter()
+            scenario.walk(best, duration=seconds)
+            alone.append(time.perf_counter() - before)
+            own.append(spent[0])
+            before = time.perf_counter()
+            scenario.walk(best, CANDIDATES, duration=seconds)
+            many.append(time.perf_counter() - before)
+            done = subprocess.run(
+                [sys.executable, "-c", OPENSIM, str(given)], capture_output=True, text=True, check=True
+            )
+            theirs.append(float(done.stdout.split()[-1]))
+    took = walked.times[0]
+    print(
+            command = [sys.executable, "-c", OPENSIM, str(given)]
+            done = subprocess.run(command, capture_output=True, text=True, check=True)
+    )
+    print("| | seconds of walking a second | beside OpenSim |")
+    print("|---|---|---|")
+    opensim = statistics.median(theirs)
+    for name, times, count in (
+        ("OpenSim integrates", theirs, 1),
+        ("osimlite integrates, one core", own, 1),
+        ("with reflexes and measures", alone, 1),
+        (f"{CANDIDATES} candidates, all cores", many, CANDIDATES),
+    ):
+        rate = count * took / statistics.median(times)
+        print(f"| {name} | {rate:.3g} | {rate * opensim / took:.3g} |")
+
+
+if __name__ == "__main__":
+    chosen = sys.argv[1:]
+    with tempfile.TemporaryDirectory() as ours:
+        path = Path(chosen[0]) if chosen else write_scenario(Path(ours))
+        main(path, float(chosen[1]) if len(chosen) > 1 else 5.0)
