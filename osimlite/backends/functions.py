@@ -22,6 +22,7 @@ from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.simulation.kernels.pack import Packed, pack
 from osimlite.simulation.states import StateLayout, in_model_order
+from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:
     from osimlite.backends.given_paths import SearchedPaths
@@ -154,7 +155,7 @@ class CasadiModel:
             ways = (
                 [searched.measured(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)] if searched.size else []
             )
-            return np.concatenate((packed.numbers, _station_numbers(mechanism, packed), *ways))
+            return np.concatenate((packed.numbers, *_fixed_numbers(mechanism, packed), *ways))
 
         return Parameters(model.copy_deep(), self.parameters, numbers_of)
 
@@ -313,13 +314,49 @@ class CasadiModel:
     def _outputs(self) -> dict[str, tuple[list[str], Any]]:
         from osimlite.backends.outputs import output_columns
 
-        stations = self._station_points()
-        return output_columns(self.mechanism, self._packed, self.forces, self._evaluated, stations)
+        return output_columns(self.mechanism, self._packed, self.forces, self._evaluated, self._fixed[0])
 
-    def _station_points(self) -> list[Any]:
-        if not self._parameters:
-            return _station_numbers(self.mechanism, self._packed).tolist()
-        return [*self._traced.numbers[len(self._packed.numbers) :]]
+    @cached_property
+    def _fixed(self) -> tuple[list[Any], list[Any]]:
+        """Points of stations, and axes and origins of frames, of which some may be symbols."""
+        stations, frames = (part.tolist() for part in _fixed_numbers(self.mechanism, self._packed))
+        if self._parameters:
+            first = len(self._packed.numbers)
+            second = first + len(stations)
+            numbers = [*self._traced.numbers]
+            stations, frames = numbers[first:second], numbers[second : second + len(frames)]
+        return stations, frames
+
+    def frames(self, paths: Iterable[str]) -> Any:
+        """``frames(t, x, p) -> position, rotation, velocity, angular_velocity``: of frames, in ground, a column each.
+
+        Args:
+            paths: of k frames.
+
+        Returns:
+            A ``casadi.Function``: origins (3, k) in m, rotation matrices (9, k) column by column, velocities of the
+            origins (3, k) in m/s, angular velocities (3, k) in rad/s.
+
+        Raises:
+            SettingError: there is no such frame.
+        """
+        from osimlite.backends.outputs import frame_columns, frame_places
+
+        places, chosen = frame_places(self.mechanism, self._packed), []
+        numbers = {path: self._fixed[1][12 * number : 12 * number + 12] for number, path in enumerate(places)}
+        for path in paths:
+            if path not in places:
+                raise SettingError(f"the model has no frame '{path}'{did_you_mean(path, places)}")
+            chosen.append((places[path][0], numbers[path]))
+        given = "t", "x", "p"
+        symbols = [self._symbols[name] for name in given]
+        results = frame_columns(self._moving, chosen)
+        return self._library.Function("frames", symbols, [*results.values()], [*given], [*results])
+
+    @cached_property
+    def _moving(self) -> Evaluated:
+        """The poses and speeds of the links, without forces."""
+        return self._traced.evaluated(STAGE.VELOCITY)
 
     @cached_property
     def paths(self) -> Any:
@@ -390,8 +427,10 @@ class CasadiModel:
         return [*written, folder / "model.c", folder / "model.h", folder / "model.json"]
 
 
-def _station_numbers(mechanism: Mechanism, packed: Packed) -> Array:
-    """Points in their links of all stations (3 k,)."""
-    from osimlite.backends.outputs import station_places
+def _fixed_numbers(mechanism: Mechanism, packed: Packed) -> tuple[Array, Array]:
+    """Points in their links of all stations (3 k,), and of all frames axes and origins there (12 m,)."""
+    from osimlite.backends.outputs import frame_places, station_places
 
-    return np.array([number for _, _, point in station_places(mechanism, packed) for number in point])
+    stations = [number for _, _, point in station_places(mechanism, packed) for number in point]
+    frames = [number for _, numbers in frame_places(mechanism, packed).values() for number in numbers]
+    return np.array(stations), np.array(frames)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from osimlite.backends.symbolic import on_symbols
+from osimlite.backends.symbols import casadi
 from osimlite.backends.traced import Evaluated
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
@@ -17,7 +18,7 @@ from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.kernels.layout import INERTIA_AT, MODEL
 from osimlite.simulation.kernels.pack import Packed
 from osimlite.simulation.kernels.paths import LENGTH, SPEED
-from osimlite.simulation.kernels.points import station, velocity
+from osimlite.simulation.kernels.points import angular_velocity, direction, station, velocity
 
 AXES = "xyz"
 
@@ -26,6 +27,35 @@ def station_places(mechanism: Mechanism, packed: Packed) -> list[tuple[str, int,
     """Of every station its path, its link, and where in that it is."""
     places = Places(mechanism, {}, packed.placements)
     return [(path, *places.station(body, point.tolist())) for path, (body, point) in mechanism.stations.items()]
+
+
+def frame_places(mechanism: Mechanism, packed: Packed) -> dict[str, tuple[int, list[float]]]:
+    """By the path of every frame its link, and its axes and origin in that (12,)."""
+    places = Places(mechanism, {}, packed.placements)
+    return {path: places.frame(placed.body, placed.transform) for path, placed in mechanism.frames.items()}
+
+
+def frame_columns(found: Evaluated, frames: Sequence[tuple[int, Sequence[Any]]]) -> dict[str, Any]:
+    """What `CasadiModel.frames` gives of a state.
+
+    Args:
+        found: of the state, up to its speeds.
+        frames: link, and axes and origin in the link (12,), which may be symbols.
+    """
+    columns: list[list[Any]] = [[], [], [], []]
+    for link, numbers in frames:
+        origin = on_symbols(station)(found.s, found.w, link, tuple(numbers[9:]))
+        columns[0] += origin
+        for axis in range(3):
+            columns[1] += on_symbols(direction)(found.s, found.w, link, tuple(numbers[3 * axis : 3 * axis + 3]))
+        columns[2] += on_symbols(velocity)(found.s, found.w, link, origin)
+        columns[3] += on_symbols(angular_velocity)(found.s, found.w, link)
+    names = "position", "rotation", "velocity", "angular_velocity"
+    sizes = 3, 9, 3, 3
+    return {
+        name: casadi.reshape(found.sure(column), size, len(frames))
+        for name, column, size in zip(names, columns, sizes, strict=True)
+    }
 
 
 def output_columns(

@@ -112,6 +112,8 @@ class GivenMotion:
         """
         raise UnsupportedError("goals of poses, forces or markers are not computed where the motion is given")
 
+    frames = outputs
+
     def numbers(self, times: Array) -> Array:
         """What is known at times (t,), one row each: lengths and speeds of m paths, what n coordinates need, and what
         each of the paths gives each of them by 1 N."""

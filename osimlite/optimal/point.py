@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from osimlite.backends.symbols import casadi
 from osimlite.multibody.spatial import Array
@@ -28,6 +28,15 @@ class Series:
 
     number: int
     values: Callable[[Array], Array]
+
+
+class Frame(NamedTuple):
+    """Where a frame is in ground, and how it moves."""
+
+    position: Formula  # (3, 1), m
+    rotation: Formula  # (3, 3)
+    velocity: Formula  # of its origin (3, 1), m/s
+    angular_velocity: Formula  # (3, 1), rad/s
 
 
 @dataclass(eq=False)
@@ -90,6 +99,15 @@ class Point:
             self._kept.update(zip(functions.outputs.name_out(), values, strict=True))
         labels = functions.output_names[name]
         return {label: self._kept[name][place] for place, label in enumerate(labels)}
+
+    def frame(self, path: str) -> Frame:
+        """A frame of the model."""
+        found = self.problem.functions.frames([path])(self.t, self.x, self.p)
+        return Frame(found[0], casadi.reshape(found[1], 3, 3), *found[2:])
+
+    def acceleration(self, frame: Frame) -> Formula:
+        """Of the origin of a frame (3, 1), m/s²."""
+        return casadi.jtimes(frame.velocity, self.x, self.rates)
 
     def mass_center(self) -> Formula:
         """Of the whole model in ground (3,), m."""

@@ -26,7 +26,7 @@ from osimlite.schema.base import Component, Object
 from osimlite.schema.controllers import Controller
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.moco.goals import MocoControlGoal, MocoGoal
-from osimlite.schema.moco.parts import MocoWeightSet
+from osimlite.schema.moco.parts import MocoParameter, MocoWeightSet
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoStudy
 from osimlite.schema.model import Model
 from osimlite.schema.motions import PositionMotion
@@ -84,7 +84,7 @@ class Problem(Asked):
         motion = motion or self._motion()
         self.components = {part.path: part for part in self.model.walk() if isinstance(part, Component)}
         self._refuse_parts()
-        paths = {parameter.name: self._parameter_paths(parameter) for parameter in self.phase.parameters}
+        paths = {parameter.name: self.parameter_paths(parameter) for parameter in self.phase.parameters}
         self.functions: Any = self._functions([path for own in paths.values() for path in own], motion)
         self.parameters: dict[str, Range] = {
             parameter.name: range_of(parameter.moco_bounds) or FREE for parameter in self.phase.parameters
@@ -133,6 +133,14 @@ class Problem(Asked):
         series = Series(len(self.series), values)
         self.series.append(series)
         return series
+
+    def parameter_paths(self, parameter: MocoParameter) -> list[str]:
+        """Paths of the numbers that a parameter stands for, one at least."""
+        if not parameter.component_paths:
+            raise self.wrong(parameter, "it names no component")
+        element = parameter.property_element
+        behind = "" if element is None else f"/{element}"
+        return [f"{str(path).rstrip('/')}/{parameter.property_name}{behind}" for path in parameter.component_paths]
 
     # ------------------------------------------------------------------------------------------------- parts
     def _model(self) -> Model:
@@ -199,11 +207,6 @@ class Problem(Asked):
         ):
             if wanted:
                 yield MocoControlGoal(name=name, weight=weight), integral(partial(_squares, part))
-
-    def _parameter_paths(self, parameter: Any) -> list[str]:
-        element = parameter.property_element
-        behind = "" if element is None else f"/{element}"
-        return [f"{str(path).rstrip('/')}/{parameter.property_name}{behind}" for path in parameter.component_paths]
 
     def _expect_infos(self) -> None:
         for infos, known, what in (

@@ -12,6 +12,7 @@ import osimlite
 from osimlite.moco import MocoTrajectory, evaluated, problem_of, solve
 from osimlite.optimal.hessian import Hessian
 from osimlite.optimal.program import Program
+from osimlite.simulation.files.storage import read_sto, write_sto
 from tests.optimal.studies import moco_found, moco_said, study, study_file
 
 STUDIES = "sliding-100", "pendulum-50", "squat-25"
@@ -169,12 +170,75 @@ def test_parameters_are_found(tmp_path):
     assert MocoTrajectory.read(tmp_path / "solution.sto").parameters == found.parameters
 
 
+FOLLOWED = (
+    osimlite.MocoTranslationTrackingGoal,
+    osimlite.MocoOrientationTrackingGoal,
+    osimlite.MocoAngularVelocityTrackingGoal,
+)
+
+
+def _frames(tmp_path, kind, **given):
+    """Moco's swing of the pendulum, and a goal of its second body."""
+    changed, found = study(tmp_path, "pendulum-50"), moco_found(tmp_path, "pendulum-50")
+    reference = osimlite.TableProcessor(filepath=str(found))
+    goal = kind(**{"name": "follow", "frame_paths": ["/bodyset/b1"], "states_reference": reference} | given)
+    changed.problem.phases.goals = [goal]
+    return changed, found
+
+
+@pytest.mark.parametrize("kind", FOLLOWED)
+def test_frames_follow_their_own_motion(kind, tmp_path):
+    """What is computed of a motion costs nothing in it, and the angle of none has a derivative."""
+    changed, found = _frames(tmp_path, kind)
+    table, reference = read_sto(found), tmp_path / "reference.sto"
+    states = [column for column in table.columns if column.startswith("/jointset")]
+    write_sto(reference, "", table.times, states, np.column_stack([table[name] for name in states]))
+    changed.problem.phases.goals[0].states_reference.filepath = str(reference)
+    program = Program(problem_of(changed))
+    terms, _ = evaluated(program, MocoTrajectory.read(found))
+    assert terms["follow"] < 1e-12
+    changed.solver.optim_max_iterations = 1
+    assert np.isfinite(solve(changed, guess=found).objective)
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "said"),
+    [
+        (FOLLOWED[0], {"frame_paths": ["/bodyset/b2"]}, "no frame '/bodyset/b2'; did you mean '/bodyset/b"),
+        (FOLLOWED[0], {"frame_paths": []}, "frame_paths names no frames"),
+        (FOLLOWED[1], {"states_reference": osimlite.TableProcessor()}, "names no file to follow"),
+        (FOLLOWED[1], {"rotation_reference_file": "turns.sto"}, "names a file and a states_reference"),
+        (FOLLOWED[2], {}, "no state '/tau0'"),
+    ],
+)
+def test_frames_that_are_not_told(kind, given, said, tmp_path):
+    with pytest.raises(osimlite.OsimliteError, match=said):
+        problem_of(_frames(tmp_path, kind, **given)[0])
+
+
+@pytest.mark.parametrize(
+    ("expression", "variables", "said"),
+    [
+        ("", (), "it has no expression"),
+        ("2*m", (), "expression is '2\\*m': .*'m'"),
+        ("1+", (), "expression is '1\\+'"),
+        ("m", ("m",), "0 parameters and 1 variables"),
+    ],
+)
+def test_expressions_that_are_none(expression, variables, said, tmp_path):
+    changed = study(tmp_path, "pendulum-50")
+    goal = osimlite.MocoExpressionBasedParameterGoal(name="e", expression=expression, variables=variables)
+    changed.problem.phases.goals = [goal]
+    with pytest.raises(osimlite.OsimliteError, match=said):
+        problem_of(changed)
+
+
 def test_what_is_not_solved_is_refused_by_name_and_place(tmp_path):
     path = study_file(tmp_path, "pendulum-50")
     text = path.read_text()
-    path.write_text(text.replace("MocoFinalTimeGoal", "MocoStepTimeAsymmetryGoal"))
-    line = next(k for k, words in enumerate(path.read_text().splitlines(), 1) if "<MocoStepTimeAsymmetryGoal" in words)
-    with pytest.raises(osimlite.OsimliteError, match="MocoStepTimeAsymmetryGoal 'time': goals of this class") as raised:
+    path.write_text(text.replace("MocoFinalTimeGoal", "MocoJointReactionGoal"))
+    line = next(k for k, words in enumerate(path.read_text().splitlines(), 1) if "<MocoJointReactionGoal" in words)
+    with pytest.raises(osimlite.OsimliteError, match="MocoJointReactionGoal 'time': goals of this class") as raised:
         solve(path)
     assert (raised.value.file, raised.value.line) == (str(path), line)
     path.write_text(text.replace('name="/tau0"', 'name="/tau2"'))

@@ -78,6 +78,67 @@ def test_markers_controls_and_bounds_over_time(tmp_path):
     assert objective <= sum(theirs.values()) * (1.0 + 1e-6)
 
 
+OUR_FRAMES = """
+import json
+import osimlite
+from osimlite import moco
+from osimlite.optimal.program import Program
+study = osimlite.read_document("study.omoco")
+next(goal for goal in study.problem.phases.goals if goal.name == "turns").rotation_reference_file = "turns.sto"
+terms, _ = moco.evaluated(Program(moco.problem_of(study)), moco.MocoTrajectory.read("theirs.sto"))
+for goal in study.problem.phases.goals:
+    goal.enabled = goal.name in ("places", "turns", "heavy")
+study.problem.phases.path_constraints[0].frame_pairs[0].maximum_distance = 1.2
+study.solver.optim_max_iterations, study.solver.optim_convergence_tolerance = 200, 1e-3
+study.solver.optim_hessian_approximation = "exact"
+found = moco.solve(study)
+mechanism, apart = osimlite.mechanism(osimlite.read("model.osim")), []
+for k in range(0, len(found.states.times)):
+    q = [found.states[f"{info.path}/value"][k] for info in mechanism.coordinates]
+    x, y, z = mechanism.frame_transform("/bodyset/b1", q)[:3, 3]
+    apart.append(((0.2 * x - y) ** 2 / 1.04 + z * z) ** 0.5)
+print(json.dumps([terms, found.success, found.parameters["mass"], min(apart), max(apart)]))
+"""
+
+
+def test_frames_and_expressions(tmp_path):
+    """After one of its iterations Moco's costs of frames, steps and parameters are those that are found here."""
+    osim = pytest.importorskip("opensim")
+    model = osim.ModelFactory.createDoublePendulum()
+    turn = osim.Vec3(0.0, 0.0, -np.pi / 2)
+    floor = osim.ContactHalfSpace(osim.Vec3(0.0, -0.6, 0.0), turn, model.getGround(), "floor")
+    model.addContactGeometry(floor)
+    for number in range(2):
+        body = model.getBodySet().get(number)
+        sphere = osim.ContactSphere(0.1, osim.Vec3(0.02, -0.05, 0.01), body, f"sphere{number}")
+        model.addContactGeometry(sphere)
+        model.addComponent(osim.SmoothSphereHalfSpaceForce(f"contact{number}", sphere, floor))
+    model.finalizeConnections()
+    model.printToXML(str(tmp_path / "model.osim"))
+    t = np.linspace(0.0, 1.0, 21)
+    bodies = ("/bodyset/b0", "/bodyset/b1")
+    swing = np.stack([np.sin(2 * t), 0.5 * t, 0.1 * t * t, np.cos(3 * t), t, 0.2 * t], axis=1)
+    for name in ("places", "spins", "pulls"):
+        write_sto(tmp_path / f"{name}.sto", "", t, bodies, swing, kind="Vec3")
+    half = np.stack([np.cos(t), 0 * t, 0.3 * t, np.sin(t)], axis=1)
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    write_sto(tmp_path / "turns.sto", "", t, bodies, np.hstack([half, half[:, [0, 2, 1, 3]]]), kind="Quaternion")
+    motion = {
+        "/jointset/j0/q0/value": np.sin(2 * t),
+        "/jointset/j0/q0/speed": 2 * np.cos(2 * t),
+        "/jointset/j1/q1/value": 0.3 * t,
+        "/jointset/j1/q1/speed": np.full(21, 0.3),
+    }
+    write_sto(tmp_path / "motion.sto", "", t, tuple(motion), np.column_stack([*motion.values()]))
+    theirs, ours = (_said(tmp_path, command) for command in (["-m", "tests.oracle.moco_frames"], ["-c", OUR_FRAMES]))
+    terms, success, mass, nearest, farthest = ours
+    assert terms == pytest.approx(theirs, rel=1e-9)
+    assert success
+    # The expression is least where its slope is zero, and nothing else depends on the mass.
+    assert 2 * (mass - 0.7) == pytest.approx(1 / mass**2, abs=0.05)
+    assert nearest > 0.2 - 1e-3 and 1.0 < farthest < 1.2 + 1e-3
+
+
 TRACKED = """
 import json
 import opensim as osim

@@ -10,6 +10,8 @@ from osimlite.backends.symbols import casadi
 from osimlite.document.kept import read_anew
 from osimlite.optimal.point import Formula, Point, Terms, integral
 from osimlite.optimal.problem import Problem
+from osimlite.optimal.projection import projected
+from osimlite.optimal.steps import contact_at
 from osimlite.optimal.tables import splines
 from osimlite.schema.moco.tracking import MocoContactTrackingGoal
 from osimlite.schema.prescribed import ExternalLoads
@@ -28,10 +30,7 @@ def terms(goal: MocoContactTrackingGoal, problem: Problem) -> Terms:
         loads, folder = read_anew(path, ExternalLoads), path.parent
     table = loads_table(loads, folder, None)
     known = {force.name: force for force in loads.objects}
-    across = None if goal.projection == "none" else goal.projection_vector
-    if goal.projection != "none" and across is None:
-        raise problem.wrong(goal, "a projection needs a projection_vector")
-    direction = np.zeros(3) if across is None else np.array(across) / np.linalg.norm(across)
+    along = projected(goal, problem)
     groups = []
     for group in goal.contact_groups:
         force = known.get(group.external_force_name)
@@ -55,10 +54,7 @@ def terms(goal: MocoContactTrackingGoal, problem: Problem) -> Terms:
             for axis, series, by in zip("xyz", measured, scale, strict=True):
                 push = sum(pushes[f"{path}|force_{axis}"] for path in paths)
                 parts.append((push - point.at(series)) / by)
-            error = casadi.vertcat(*parts)
-            along = casadi.dot(error, casadi.DM(direction)) * casadi.DM(direction)
-            error = error - along if goal.projection == "plane" else along if goal.projection == "vector" else error
-            total += casadi.sumsqr(error)
+            total += casadi.sumsqr(along(casadi.vertcat(*parts)))
         return total
 
     result = integral(integrand)
@@ -67,15 +63,10 @@ def terms(goal: MocoContactTrackingGoal, problem: Problem) -> Terms:
 
 def _path(goal: MocoContactTrackingGoal, problem: Problem, name: str, force: Any, group: Any) -> str:
     """The contact's path; its sphere has to be on the body that the measured force pushes."""
-    path = f"/{name.strip('/')}"
-    contact: Any = problem.components.get(path)
-    if type(contact).__name__ != "SmoothSphereHalfSpaceForce":
-        near = did_you_mean(path, [key for key, part in problem.components.items() if hasattr(part, "socket_sphere")])
-        raise problem.wrong(goal, f"the model has no SmoothSphereHalfSpaceForce '{path}'{near}")
-    sphere: Any = problem.components.get(str(contact.socket_sphere))
-    frames = str(getattr(sphere, "socket_frame", "")).split("/")
+    path, sphere = contact_at(goal, problem, name)
+    frames = str(sphere.socket_frame).split("/")
     wanted = [force.applied_to_body, *(str(frame).rpartition("/")[2] for frame in group.alternative_frame_paths)]
-    if sphere is not None and not any(each.rpartition("/")[2] in frames for each in wanted):
+    if not any(each.rpartition("/")[2] in frames for each in wanted):
         message = f"the sphere of '{path}' is on {'/'.join(frames)}, and '{force.name}' pushes {force.applied_to_body}"
         raise problem.refused(goal, f"{message}; contacts whose half space is pushed are not followed here")
     return path

@@ -1,0 +1,23 @@
+"""Origins of frames follow given places."""
+
+from __future__ import annotations
+
+from osimlite.backends.symbols import casadi
+from osimlite.optimal.frames import Followed
+from osimlite.optimal.point import Terms
+from osimlite.optimal.problem import Problem
+from osimlite.schema.moco.tracking import MocoTranslationTrackingGoal
+
+
+def terms(goal: MocoTranslationTrackingGoal, problem: Problem) -> Terms:
+    """The integral of the weighted sum of the squares of distances, m² s."""
+    followed = Followed(
+        goal,
+        goal.translation_reference_file,
+        goal.states_reference,
+        goal.frame_paths,
+        goal.translation_weights,
+        "Vec3",
+        "position",
+    )
+    return followed.terms(problem, lambda point, frame, given: casadi.sumsqr(frame.position - given))

@@ -1,0 +1,89 @@
+"""OpenSim's Moco on a study with goals and a path constraint of frames: writes the study and where one step leads.
+
+Run in a folder with ``model.osim``, ``places.sto``, ``turns.sto``, ``spins.sto``, ``pulls.sto`` and ``motion.sto``.
+"""
+
+from __future__ import annotations
+
+import json
+
+import opensim as osim
+
+BODIES = "/bodyset/b0", "/bodyset/b1"
+
+osim.Logger.setLevelString("Off")
+study = osim.MocoStudy()
+problem = study.updProblem()
+problem.setModelProcessor(osim.ModelProcessor("model.osim"))
+problem.setTimeBounds(0, 1)
+problem.setStateInfoPattern(".*/value", [-10, 10])
+problem.setStateInfoPattern(".*/speed", [-50, 50])
+problem.setControlInfoPattern(".*", [-100, 100])
+problem.addParameter(osim.MocoParameter("mass", "/bodyset/b1", "mass", osim.MocoBounds(0.5, 2.0)))
+
+places = osim.MocoTranslationTrackingGoal("places", 1.5)
+places.setTranslationReferenceFile("places.sto")
+places.setWeightForFrame("/bodyset/b1", 2.0)
+turns = osim.MocoOrientationTrackingGoal("turns", 0.7)
+# It reads no file of orientations that it writes.
+quaternions = osim.TimeSeriesTableQuaternion("turns.sto")
+turns.setRotationReference(osim.OpenSenseUtilities.convertQuaternionsToRotations(quaternions))
+moved = osim.MocoOrientationTrackingGoal("moved", 1.3)
+moved.setStatesReference(osim.TableProcessor("motion.sto"))
+moved.setWeightForFrame("/bodyset/b0", 0.4)
+spins = osim.MocoAngularVelocityTrackingGoal("spins", 0.01)
+spins.setAngularVelocityReferenceFile("spins.sto")
+pulls = osim.MocoAccelerationTrackingGoal("pulls", 1e-4)
+pulls.setAccelerationReferenceFile("pulls.sto")
+felt = osim.MocoAccelerationTrackingGoal("felt", 1e-4)
+felt.setAccelerationReferenceFile("pulls.sto")
+felt.setGravityOffset(True)
+felt.setExpressAccelerationsInTrackingFrames(True)
+for goal in (places, turns, moved, spins, pulls, felt):
+    osim_paths = osim.StdVectorString()
+    for path in BODIES:
+        osim_paths.append(path)
+    goal.setFramePaths(osim_paths)
+    problem.addGoal(goal)
+
+lengths = osim.MocoStepLengthAsymmetryGoal("lengths", 0.3)
+lengths.setLeftFootFrame(BODIES[0])
+lengths.setRightFootFrame(BODIES[1])
+lengths.setStrideLength(0.8)
+lengths.setTargetAsymmetry(0.1)
+lengths.setWalkingDirection("negative-y")
+lengths.setAsymmetrySmoothing(0.05)
+problem.addGoal(lengths)
+
+times = osim.MocoStepTimeAsymmetryGoal("times", 0.2)
+for side, number in (("Left", 0), ("Right", 1)):
+    paths = osim.StdVectorString()
+    paths.append(f"/contact{number}")
+    getattr(times, f"set{side}ContactGroup")(paths, f"/contact{number}")
+times.setWalkingDirection("positive-x")
+times.setContactForceThreshold(3.0)
+times.setTargetAsymmetry(-0.1)
+problem.addGoal(times)
+
+heavy = osim.MocoExpressionBasedParameterGoal("heavy", 0.6, "square(m - 0.7) + 1/m")
+heavy.addParameter(osim.MocoParameter("mass", "/bodyset/b1", "mass", osim.MocoBounds(0.5, 2.0)), "m")
+problem.addGoal(heavy)
+
+apart = osim.MocoFrameDistanceConstraint()
+apart.setName("apart")
+apart.addFramePair(osim.MocoFrameDistanceConstraintPair("/ground", "/bodyset/b1", 0.2, 1.9))
+apart.setProjection("plane")
+apart.setProjectionVector(osim.Vec3(1.0, 0.2, 0.0))
+problem.addPathConstraint(apart)
+
+solver = study.initCasADiSolver()
+solver.set_num_mesh_intervals(3)
+solver.set_transcription_scheme("trapezoidal")
+# Each change of a parameter makes its system anew, which is slow.
+solver.set_optim_max_iterations(1)
+study.printToXML("study.omoco")
+solution = study.solve()
+solution.unseal()
+solution.write("theirs.sto")
+names = solution.getObjectiveTermNames()
+print(json.dumps({name: solution.getObjectiveTermByIndex(place) for place, name in enumerate(names)}))
