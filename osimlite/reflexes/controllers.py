@@ -320,8 +320,15 @@ class Reflexes:
         self._of_result = np.array([term.kind == OF_RESULT for term in own], dtype=bool)
         self._leg_of = np.array([term.leg for term in self._terms], dtype=int)
         self._masks = np.array([term.states for term in self._terms], dtype=bool).reshape(-1, 5)
-        self._spread = np.zeros((len(self._terms), len(self.walkers.names)))
-        self._spread[range(len(self._terms)), [term.target for term in self._terms]] = 1.0
+        # Terms that no two of have one target are added at once, in an order that is the same for one candidate and for
+        # many, as a product of matrices is not.
+        rounds: list[list[tuple[int, int]]] = []
+        for number, term in enumerate(self._terms):
+            free = next((each for each in rounds if all(term.target != target for _, target in each)), None)
+            if free is None:
+                rounds.append(free := [])
+            free.append((number, term.target))
+        self._rounds = [np.array(each).T for each in rounds]
 
     # ------------------------------------------------------------------------------------------- while walking
     def begin(self, felt: Felt) -> None:
@@ -348,7 +355,11 @@ class Reflexes:
             values *= passes[:, self._gate_of]
         each = np.hstack([values, self._constants])
         on = np.take_along_axis(self._masks.T, self.states[:, self._leg_of], axis=0)
-        return (each * on) @ self._spread
+        each *= on
+        result = np.zeros((self.walkers.count, len(self.walkers.names)))
+        for numbers, targets in self._rounds:
+            result[:, targets] += each[:, numbers]
+        return result
 
     def _go_on(self, felt: Felt) -> None:
         legs = self.walkers.legs
