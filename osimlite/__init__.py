@@ -3,8 +3,8 @@
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
 ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``inverse_kinematics``,
 ``FrameSolver``, ``scale``, ``fit``, ``kinematics``, ``inverse_dynamics``, ``static_optimization``, ``casadi``,
-``linearize``, ``modify``, ``run``, ``check_trial``, ``report``, the errors, and every component class under OpenSim's
-own name (``osimlite.PinJoint``).
+``linearize``, ``sensitivity``, ``modify``, ``run``, ``check_trial``, ``report``, the errors, and every component class
+under OpenSim's own name (``osimlite.PinJoint``).
 Names are imported when first used, so that importing osimlite costs nothing.
 """
 
@@ -18,6 +18,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from osimlite.backends.functions import casadi as casadi
     from osimlite.backends.linear import linearize as linearize
+    from osimlite.backends.sensitivity import sensitivity as sensitivity
     from osimlite.document.plugins import classes_in as classes_in
     from osimlite.document.printer import to_text as to_text
     from osimlite.document.printer import write as write
@@ -68,6 +69,7 @@ if TYPE_CHECKING:
         "report",
         "run",
         "scale",
+        "sensitivity",
         "simulate",
         "static_optimization",
         "to_mjcf",
@@ -91,6 +93,7 @@ _FUNCTIONS = {
     "fit": "osimlite.fitting.person",
     "scale": "osimlite.fitting.scale_tool",
     "linearize": "osimlite.backends.linear",
+    "sensitivity": "osimlite.backends.sensitivity",
     "modify": "osimlite.modifying.words",
     "mechanism": "osimlite.multibody:build_mechanism",
     "to_mjcf": "osimlite.translate",

@@ -138,6 +138,11 @@ class CasadiModel:
         places = {f"{infos[k].path}/value": k for k in moving}
         return SearchedPaths(mechanism, forces, [places[path] for path in paths])
 
+    @property
+    def searched(self) -> tuple[str, ...]:
+        """Paths of the forces along paths around surfaces, whose way is searched for."""
+        return self._searched.names
+
     def _symbolic(self, model: Model) -> Any:
         if not self.parameters:
             return None

@@ -95,6 +95,7 @@ class SearchedPaths:
     Attributes:
         forces: with given paths in the place of those.
         given: these.
+        names: of what acts along these.
         size: how many numbers they have together.
     """
 
@@ -111,6 +112,7 @@ class SearchedPaths:
         moved = [[k for k in self._order if row[k] > 0.0] for row in arms]
         self.given = [GivenPath(coordinates) for coordinates in moved]
         self._groups = _apart(moved)
+        self.names = tuple(item.path for item in owners)
         self.size = sum(item.size for item in self.given)
         others = {item.path: given for item, given in zip(owners, self.given, strict=True)}
         elements = (replace(e, place=others[e.path]) if e.path in others else e for e in forces.elements)

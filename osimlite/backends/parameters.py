@@ -91,6 +91,11 @@ class Parameters:
                 setter.put(value)
 
 
+def number_of(model: Model, name: str) -> float:
+    """The value that a parameter has in a model; errors as those of `Parameters`."""
+    return _value(name, _setters(model, name))
+
+
 def _setters(model: Model, name: str) -> list[Setter]:
     setters = [place.setter(model) for place in places(model, name)]
     if not setters:
