@@ -17,7 +17,7 @@ import numpy as np
 
 from osimlite.backends.functions import CasadiModel
 from osimlite.backends.parameters import number_of
-from osimlite.errors import SettingError, UnsupportedError
+from osimlite.errors import SettingError, SimulationError, UnsupportedError
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.schema.model import Model, expect_model
@@ -110,7 +110,7 @@ def sensitivity(
             those of another model.
         UnsupportedError: constraints bind the motion, a path runs around a surface, or a part of the model has no
             formula.
-        SimulationError: the motion ended.
+        SimulationError: the motion ended, or a derivative of it is no finite number.
 
     Other errors are those of :func:`osimlite.casadi` and :func:`osimlite.simulate`.
     """
@@ -206,6 +206,9 @@ class _Followed:
         h = t1 - t0
         controls = [self._controls(t) for t in (t0, t0 + h / 3.0, t0 + h / 2.0, t1)]
         y, error = (part.full() for part in self._step(t0, h, y0, np.array(controls).T, self._p))
+        if not np.isfinite(y).all():
+            worst = self._functions.states[int(np.nonzero(~np.isfinite(y))[0][0])]
+            raise SimulationError(f"between {t0:g} and {t1:g} s the derivatives of '{worst}' are no finite numbers")
         # As the integrator weighs states; of each number, what counts is its largest derivative.
         weights = 1.0 / np.maximum(1.0, np.abs(y0[:, :1]))
         sizes = (np.maximum(np.abs(y0), np.abs(y)) * weights)[:, 1:].max(axis=0)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from functools import cache
 from itertools import pairwise
 
+import casadi
 import numpy as np
 import pytest
 
 import osimlite
-from osimlite.errors import SettingError, UnsupportedError
+from osimlite.errors import SettingError, SimulationError, UnsupportedError
 from osimlite.models.jumper import jumper
 from osimlite.models.walkers import furthest_walker
 from osimlite.sweep.properties import places
@@ -149,3 +150,13 @@ def test_what_is_not_there_is_refused():
     ))  # fmt: skip
     with pytest.raises(UnsupportedError, match=r"gear' constrains the motion, .* lock coordinates"):
         osimlite.sensitivity(model, to=0.1)
+
+
+def test_derivatives_that_are_no_numbers_are_told(monkeypatch):
+    def step(functions, count):
+        size = len(functions.states), 1 + count
+        return lambda *given: (casadi.DM(np.full(size, np.nan)), casadi.DM(*size))
+
+    monkeypatch.setattr("osimlite.backends.sensitivity._step", step)
+    with pytest.raises(SimulationError, match=r"the derivatives of '/jointset/hinge/angle/value' are no finite"):
+        osimlite.sensitivity(pendulum(), ["/bodyset/rod/mass"], 0.1)
