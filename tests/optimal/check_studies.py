@@ -233,6 +233,29 @@ def test_expressions_that_are_none(expression, variables, said, tmp_path):
         problem_of(changed)
 
 
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, "names no output_path"),
+        ({"output_path": "/bodyset/b2|position"}, "no component '/bodyset/b2'; did you mean '/bodyset/b"),
+        ({"output_path": "/bodyset/b1|rotation"}, "the output 'rotation' of /bodyset/b1 has no formula"),
+        ({"output_path": "/bodyset/b1|position", "output_index": 3}, "no component of output_index 3"),
+        ({"output_path": "/jointset/j0/q0|value", "output_index": 0}, "no component of output_index 0"),
+        ({"output_path": "/bodyset/b1|position", "exponent": 0}, "exponent is 0"),
+        ({"output_path": "/bodyset/b1|position", "operation": "addition"}, "need each other"),
+        (
+            {"output_path": "/|com_position", "second_output_path": "/tau0|actuation", "operation": "addition"},
+            "outputs are of different types",
+        ),
+    ],
+)
+def test_outputs_that_are_none(given, said, tmp_path):
+    changed = study(tmp_path, "pendulum-50")
+    changed.problem.phases.goals = [osimlite.MocoOutputGoal(name="output", **given)]
+    with pytest.raises(osimlite.OsimliteError, match=said):
+        problem_of(changed)
+
+
 def test_what_is_not_solved_is_refused_by_name_and_place(tmp_path):
     path = study_file(tmp_path, "pendulum-50")
     text = path.read_text()

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from osimlite.simulation.files.storage import write_sto
+from osimlite.simulation.files.storage import read_sto, write_sto
 from osimlite.simulation.files.trc import write_trc
 from tests.conftest import ROOT
 from tests.optimal.studies import moco_said, study_file
@@ -137,6 +137,80 @@ def test_frames_and_expressions(tmp_path):
     # The expression is least where its slope is zero, and nothing else depends on the mass.
     assert 2 * (mass - 0.7) == pytest.approx(1 / mass**2, abs=0.05)
     assert nearest > 0.2 - 1e-3 and 1.0 < farthest < 1.2 + 1e-3
+
+
+OF_OUTPUTS = [
+    ("MocoOutputGoal", "/|com_position", 1, 1, "", ""),
+    ("MocoFinalOutputGoal", "/|com_velocity", -1, 2, "", ""),
+    ("MocoOutputGoal", "/|com_acceleration", 0, 1, "", ""),
+    ("MocoInitialOutputGoal", "/bodyset/b1|position", 0, 3, "", ""),
+    ("MocoOutputGoal", "/bodyset/b1|linear_velocity", -1, 1, "", ""),
+    ("MocoOutputGoal", "/bodyset/b1|angular_velocity", 2, 1, "", ""),
+    ("MocoOutputGoal", "/bodyset/b1|linear_acceleration", -1, 2, "", ""),
+    ("MocoFinalOutputGoal", "/bodyset/b0|angular_acceleration", 2, 1, "", ""),
+    ("MocoOutputGoal", "/markerset/tip|location", 0, 2, "", ""),
+    ("MocoOutputGoal", "/markerset/tip|velocity", -1, 1, "", ""),
+    ("MocoOutputGoal", "/markerset/tip|acceleration", 1, 1, "", ""),
+    ("MocoOutputGoal", "/jointset/j0/q0|value", -1, 3, "", ""),
+    ("MocoOutputGoal", "/jointset/j1/q1|speed", -1, 1, "", ""),
+    ("MocoOutputGoal", "/jointset/j1/q1|acceleration", -1, 1, "", ""),
+    ("MocoOutputGoal", "/forceset/muscle|fiber_length", -1, 1, "", ""),
+    ("MocoOutputGoal", "/forceset/muscle|activation", -1, 2, "", ""),
+    ("MocoOutputGoal", "/forceset/muscle|active_fiber_force", -1, 1, "", ""),
+    ("MocoOutputGoal", "/bodyset/b1|position", -1, 1, "subtraction", "/bodyset/b0|position"),
+    ("MocoOutputGoal", "/bodyset/b1|position", -1, 2, "multiplication", "/markerset/tip|location"),
+    ("MocoOutputGoal", "/jointset/j0/q0|speed", -1, 1, "addition", "/jointset/j1/q1|speed"),
+    ("MocoOutputGoal", "/bodyset/b1|position", 0, 1, "division", "/bodyset/b0|position"),
+]
+OUR_OUTPUTS = """
+import json
+import osimlite
+from osimlite import moco
+from osimlite.optimal.program import Program
+study = osimlite.read_document("study.omoco")
+terms, _ = moco.evaluated(Program(moco.problem_of(study)), moco.MocoTrajectory.read("theirs.sto"))
+study.problem.phases.goals = [osimlite.MocoControlGoal(name="effort")]
+study.solver.optim_max_iterations = 200
+found = moco.solve(study)
+mechanism, high = osimlite.mechanism(osimlite.read("model.osim")), []
+for k in range(0, len(found.states.times), 2):
+    q = [found.states[f"{info.path}/value"][k] for info in mechanism.coordinates]
+    high.append(mechanism.station_positions(q)["/markerset/tip"][1] - (0.5 * found.states.times[k] - 1.2))
+print(json.dumps([terms, found.success, max(high)]))
+"""
+
+
+def test_outputs(tmp_path):
+    """After one of its iterations Moco's goals of outputs are those that are found here; bounds of outputs hold."""
+    osim = pytest.importorskip("opensim")
+    model = osim.ModelFactory.createDoublePendulum()
+    model.addMarker(osim.Marker("tip", model.getBodySet().get(1), osim.Vec3(0.1, 0.05, 0.02)))
+    muscle = osim.DeGrooteFregly2016Muscle()
+    muscle.setName("muscle")
+    for name, value in (("max_isometric_force", 30.0), ("optimal_fiber_length", 0.4), ("tendon_slack_length", 0.1)):
+        getattr(muscle, f"set_{name}")(value)
+    muscle.set_ignore_tendon_compliance(True)
+    muscle.set_pennation_angle_at_optimal(0.2)
+    muscle.addNewPathPoint("origin", model.getGround(), osim.Vec3(0.1, 0.3, 0.0))
+    muscle.addNewPathPoint("insertion", model.getBodySet().get(0), osim.Vec3(-0.7, 0.05, 0.0))
+    model.addForce(muscle)
+    model.finalizeConnections()
+    model.printToXML(str(tmp_path / "model.osim"))
+    (tmp_path / "outputs.json").write_text(json.dumps(OF_OUTPUTS))
+    theirs, ours = (_said(tmp_path, command) for command in (["-m", "tests.oracle.moco_outputs"], ["-c", OUR_OUTPUTS]))
+    terms, success, high = ours
+    # OpenSim says of values and speeds that they need no states, so that Moco takes those of an evaluation before.
+    table = read_sto(tmp_path / "theirs.sto")
+    q, u = (np.stack([table[f"/jointset/j{k}/q{k}/{what}"] for k in (0, 1)]) for what in ("value", "speed"))
+    simpson = np.convolve([1, 4, 1], [1, 0, 1, 0, 1, 0, 1]) / 24
+    theirs |= zip(
+        ("g11", "g12", "g19"), (simpson @ np.abs(q[0]) ** 3, simpson @ u[1], simpson @ u.sum(axis=0)), strict=True
+    )
+    named = {f"g{number}": output for number, output in enumerate(OF_OUTPUTS)}
+    assert {named[name]: value for name, value in terms.items()} == pytest.approx(
+        {named[name]: value for name, value in theirs.items()}, rel=1e-9
+    )
+    assert success and high < 1e-3
 
 
 TRACKED = """

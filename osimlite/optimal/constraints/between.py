@@ -1,4 +1,4 @@
-"""Variables between functions of time, which controls and states share."""
+"""Numbers between functions of time, which controls, states and outputs share."""
 
 from __future__ import annotations
 
@@ -12,11 +12,15 @@ from osimlite.optimal.bounds import Range
 from osimlite.optimal.point import Formula, Point, Rows
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.tables import over_time
-from osimlite.schema.moco.path_constraints import MocoControlBoundConstraint, MocoStateBoundConstraint
+from osimlite.schema.moco.path_constraints import (
+    MocoControlBoundConstraint,
+    MocoOutputBoundConstraint,
+    MocoStateBoundConstraint,
+)
 
 
 def rows_between(
-    constraint: MocoControlBoundConstraint | MocoStateBoundConstraint,
+    constraint: MocoControlBoundConstraint | MocoStateBoundConstraint | MocoOutputBoundConstraint,
     problem: Problem,
     paths: Sequence[str],
     variable: Callable[[Point, str], Formula],

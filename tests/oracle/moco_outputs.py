@@ -1,0 +1,44 @@
+"""OpenSim's Moco on a study of goals of outputs: writes the study and where one step leads.
+
+Run in a folder with ``model.osim``, and ``outputs.json`` with the class, and the properties of each goal.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import opensim as osim
+
+osim.Logger.setLevelString("Off")
+study = osim.MocoStudy()
+problem = study.updProblem()
+problem.setModelProcessor(osim.ModelProcessor("model.osim"))
+problem.setTimeBounds(0, 1)
+problem.setStateInfoPattern(".*/value", [-1, 1.2])
+problem.setStateInfoPattern(".*/speed", [-5, 7])
+problem.setControlInfoPattern("/tau.*", [-10, 12])
+for number, (kind, path, index, exponent, operation, second) in enumerate(json.loads(Path("outputs.json").read_text())):
+    goal = getattr(osim, kind)(f"g{number}", 1.0)
+    goal.setOutputPath(path)
+    goal.setOutputIndex(index)
+    goal.setExponent(exponent)
+    if operation:
+        goal.setOperation(operation)
+        goal.setSecondOutputPath(second)
+    problem.addGoal(goal)
+bound = osim.MocoOutputBoundConstraint()
+bound.setName("low")
+bound.setOutputPath("/markerset/tip|location")
+bound.setOutputIndex(1)
+bound.setUpperBound(osim.LinearFunction(0.5, -1.2))
+problem.addPathConstraint(bound)
+solver = study.initCasADiSolver()
+solver.set_num_mesh_intervals(4)
+solver.set_optim_max_iterations(1)
+study.printToXML("study.omoco")
+solution = study.solve()
+solution.unseal()
+solution.write("theirs.sto")
+names = solution.getObjectiveTermNames()
+print(json.dumps({name: solution.getObjectiveTermByIndex(place) for place, name in enumerate(names)}))
