@@ -161,7 +161,7 @@ class Reflexes:
         self._swings_from_stance = node.flag("allow_stance_swing_transition", False)
         self._load_delay = node.number("leg_load_sensor_delay", 0.0)
         self._lengths = np.array([node.number("override_leg_length", leg.length) for leg in self.walkers.legs])
-        self._limits = {}
+        limits: list[dict[str, Array]] = []
         for leg, side in enumerate(SIDES):
             prefix = "" if self.symmetric else f"leg{leg}{side}."
             of = {name: parameters.of(node, name, value, prefix + name) for name, value in (
@@ -173,7 +173,8 @@ class Reflexes:
             of["swing_load_threshold"] = (
                 stance if swing is None else parameters.read(swing, prefix + "swing_load_threshold")
             )
-            self._limits[leg] = of
+            limits.append(of)
+        self._limits = {name: np.column_stack([of[name] for of in limits]) for name in limits[0]}
         conditional = node.get("ConditionalControllers")
         if conditional is None:
             raise node.error("a GaitStateController needs ConditionalControllers")
@@ -367,13 +368,11 @@ class Reflexes:
         loads = self.sensors.at(np.array([self.sensors.load(leg) for leg in range(len(legs))]), delays)
         ahead = np.column_stack([felt.bodies[:, leg.foot, 0] - felt.bodies[:, leg.base, 0] for leg in legs])
 
-        def limits(name: str) -> Array:
-            return np.column_stack([self._limits[leg][name] for leg in range(len(legs))])
-
-        stands, swings = loads > limits("stance_load_threshold"), loads <= limits("swing_load_threshold")
-        late = ahead < self._lengths * limits("late_stance_threshold")
-        leaves = ahead < self._lengths * limits("liftoff_threshold")
-        lands = ahead > self._lengths * limits("landing_threshold")
+        limits = self._limits
+        stands, swings = loads > limits["stance_load_threshold"], loads <= limits["swing_load_threshold"]
+        late = ahead < self._lengths * limits["late_stance_threshold"]
+        leaves = ahead < self._lengths * limits["liftoff_threshold"]
+        lands = ahead > self._lengths * limits["landing_threshold"]
         before, after = ahead > ahead[:, ::-1], ahead < ahead[:, ::-1]
         follows = stands[:, ::-1] & after
         states = self.states
