@@ -5,20 +5,13 @@ Run in a folder with ``model.osim``, ``places.sto``, ``turns.sto``, ``spins.sto`
 
 from __future__ import annotations
 
-import json
-
 import opensim as osim
+
+from tests.oracle.moco_studies import begun, ended
 
 BODIES = "/bodyset/b0", "/bodyset/b1"
 
-osim.Logger.setLevelString("Off")
-study = osim.MocoStudy()
-problem = study.updProblem()
-problem.setModelProcessor(osim.ModelProcessor("model.osim"))
-problem.setTimeBounds(0, 1)
-problem.setStateInfoPattern(".*/value", [-10, 10])
-problem.setStateInfoPattern(".*/speed", [-50, 50])
-problem.setControlInfoPattern(".*", [-100, 100])
+study, problem = begun([-10, 10], [-50, 50], [-100, 100])
 problem.addParameter(osim.MocoParameter("mass", "/bodyset/b1", "mass", osim.MocoBounds(0.5, 2.0)))
 
 places = osim.MocoTranslationTrackingGoal("places", 1.5)
@@ -81,9 +74,4 @@ solver.set_num_mesh_intervals(3)
 solver.set_transcription_scheme("trapezoidal")
 # Each change of a parameter makes its system anew, which is slow.
 solver.set_optim_max_iterations(1)
-study.printToXML("study.omoco")
-solution = study.solve()
-solution.unseal()
-solution.write("theirs.sto")
-names = solution.getObjectiveTermNames()
-print(json.dumps({name: solution.getObjectiveTermByIndex(place) for place, name in enumerate(names)}))
+ended(study)

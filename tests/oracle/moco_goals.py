@@ -5,18 +5,11 @@ Run in a folder with ``model.osim``, ``markers.trc``, ``controls.sto`` and ``gue
 
 from __future__ import annotations
 
-import json
-
 import opensim as osim
 
-osim.Logger.setLevelString("Off")
-study = osim.MocoStudy()
-problem = study.updProblem()
-problem.setModelProcessor(osim.ModelProcessor("model.osim"))
-problem.setTimeBounds(0, 1)
-problem.setStateInfoPattern(".*/value", [-10, 10])
-problem.setStateInfoPattern(".*/speed", [-50, 50])
-problem.setControlInfoPattern(".*", [-100, 100])
+from tests.oracle.moco_studies import begun, ended
+
+study, problem = begun([-10, 10], [-50, 50], [-100, 100])
 controls = osim.MocoControlTrackingGoal("controls", 1.5)
 controls.setReference(osim.TableProcessor("controls.sto"))
 controls.setWeightForControl("/tau1", 0.7)
@@ -47,8 +40,4 @@ solver.set_num_mesh_intervals(15)
 solver.set_optim_convergence_tolerance(1e-6)
 solver.set_optim_constraint_tolerance(1e-6)
 solver.setGuessFile("guess.sto")
-study.printToXML("study.omoco")
-solution = study.solve()
-solution.write("theirs.sto")
-names = solution.getObjectiveTermNames()
-print(json.dumps({name: solution.getObjectiveTermByIndex(place) for place, name in enumerate(names)}))
+ended(study)

@@ -10,14 +10,9 @@ from pathlib import Path
 
 import opensim as osim
 
-osim.Logger.setLevelString("Off")
-study = osim.MocoStudy()
-problem = study.updProblem()
-problem.setModelProcessor(osim.ModelProcessor("model.osim"))
-problem.setTimeBounds(0, 1)
-problem.setStateInfoPattern(".*/value", [-1, 1.2])
-problem.setStateInfoPattern(".*/speed", [-5, 7])
-problem.setControlInfoPattern("/tau.*", [-10, 12])
+from tests.oracle.moco_studies import begun, ended
+
+study, problem = begun([-1, 1.2], [-5, 7], [-10, 12], "/tau.*")
 for number, (kind, path, index, exponent, operation, second) in enumerate(json.loads(Path("outputs.json").read_text())):
     goal = getattr(osim, kind)(f"g{number}", 1.0)
     goal.setOutputPath(path)
@@ -36,9 +31,4 @@ problem.addPathConstraint(bound)
 solver = study.initCasADiSolver()
 solver.set_num_mesh_intervals(4)
 solver.set_optim_max_iterations(1)
-study.printToXML("study.omoco")
-solution = study.solve()
-solution.unseal()
-solution.write("theirs.sto")
-names = solution.getObjectiveTermNames()
-print(json.dumps({name: solution.getObjectiveTermByIndex(place) for place, name in enumerate(names)}))
+ended(study)
