@@ -57,7 +57,7 @@ class Followed:
         for path in paths:
             problem.expect(goal, path, problem.functions.mechanism.frames, "frame")
         if not paths:
-            raise problem.wrong(goal, "frame_paths names no frames, and without them OpenSim follows none")
+            raise problem.wrong(goal, "frame_paths names no frames, which OpenSim refuses, too")
         table = self._table(problem, paths)
         size = len(suffixes(self.kind))
         series = splines(problem, table, [f"{path}{end}" for path in paths for end in suffixes(self.kind)])

@@ -24,6 +24,10 @@ turns.setRotationReference(osim.OpenSenseUtilities.convertQuaternionsToRotations
 moved = osim.MocoOrientationTrackingGoal("moved", 1.3)
 moved.setStatesReference(osim.TableProcessor("motion.sto"))
 moved.setWeightForFrame("/bodyset/b0", 0.4)
+shifted = osim.MocoTranslationTrackingGoal("shifted", 0.9)
+spun = osim.MocoAngularVelocityTrackingGoal("spun", 0.02)
+for goal in (shifted, spun):
+    goal.setStatesReference(osim.TableProcessor("motion.sto"))
 spins = osim.MocoAngularVelocityTrackingGoal("spins", 0.01)
 spins.setAngularVelocityReferenceFile("spins.sto")
 pulls = osim.MocoAccelerationTrackingGoal("pulls", 1e-4)
@@ -32,7 +36,7 @@ felt = osim.MocoAccelerationTrackingGoal("felt", 1e-4)
 felt.setAccelerationReferenceFile("pulls.sto")
 felt.setGravityOffset(True)
 felt.setExpressAccelerationsInTrackingFrames(True)
-for goal in (places, turns, moved, spins, pulls, felt):
+for goal in (places, turns, moved, shifted, spun, spins, pulls, felt):
     osim_paths = osim.StdVectorString()
     for path in BODIES:
         osim_paths.append(path)
