@@ -5,28 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from osimlite.backends.symbols import casadi, divide, is_symbol, largest, plain, smallest
+from osimlite.backends.symbols import casadi, divide, is_symbol, plain
 from osimlite.forces.bezier import FIRST, HEAD, LAST, NODES, SCALE, SECTION, SECTIONS, START, X, Y, curve_value
 
-VELOCITIES = 5
-"""Steps of Newton's method for the velocity of a damped fiber."""
-STEPS = 7
-"""Of Halley's method from halfway between a straight line and the steeper end: all curves are met to rounding."""
+STEPS = 5
+"""Of Halley's method in the search for a place: four meet all curves and velocities of damped fibers to rounding."""
+GRID = 2.0**53
+"""To whose parts a place is rounded: those of a number from a half to one."""
 
 
 def curve_value_on_symbols(c: Any, x: Any) -> tuple[Any, Any]:
-    """As :func:`osimlite.forces.bezier.curve_value`; the derivatives are exact where the search has come to its end."""
+    """As :func:`osimlite.forces.bezier.curve_value`, with its derivatives."""
     count = int(plain(c[SECTIONS]))
     if not is_symbol(x):
         numbers = [float(plain(c[k])) for k in range(HEAD + (1 + SECTION) * count)]
         return curve_value(numbers, float(plain(x)))
-    start, scale, *rest = _section(c, x, count)
+    start, scale, *rest = _section(c, [x >= c[HEAD + number] for number in range(count - 1)])
     of_x, of_y = rest[:5], rest[5:]
-    inside = _between(x, c[FIRST], c[LAST])
-    off = inside - start
-    u = _place(of_x, off, off * scale / NODES)
-    run = _slope([0.0, *of_x], u)
-    y, slope = _value(of_y, u), divide(_slope(of_y, u), run)
+    off = _between(x, c[FIRST], c[LAST]) - start
+    u = _place([-off, *of_x], off * scale / NODES)
+    y, slope = _value(of_y, u), divide(_slope(of_y, u), _slope([0.0, *of_x], u))
     for test, end in ((x < c[FIRST], FIRST), (x > c[LAST], LAST)):
         y = casadi.if_else(test, c[end + 1] + c[end + 2] * (x - c[end]), y)
         slope = casadi.if_else(test, c[end + 2], slope)
@@ -36,39 +34,60 @@ def curve_value_on_symbols(c: Any, x: Any) -> tuple[Any, Any]:
 def damped_velocity_on_symbols(
     m: Any, active: Any, by_length: Any, elastic: Any, tendon: Any, cos: Any, curves: Any
 ) -> tuple[bool, Any, Any]:
-    """As :func:`osimlite.forces.millard2012_equilibrium.damped_velocity`: so many of Newton's steps."""
-    wanted = divide(tendon, largest(cos, 0.01)) - elastic
-    share = active * by_length
-    guess = divide(wanted, largest(active, 0.01) * largest(by_length, 0.01))
-    velocity, _ = curve_value_on_symbols(curves.inverse, guess)
-    velocity = smallest(largest(velocity, -1.0), 1.0)
-    for _ in range(VELOCITIES):
-        factor, slope = curve_value_on_symbols(curves.velocity, velocity)
-        velocity = velocity - divide(share * factor + m.damping * velocity - wanted, share * slope + m.damping)
-    return True, velocity, curve_value_on_symbols(curves.velocity, velocity)[0]
+    """As :func:`osimlite.forces.millard2012_equilibrium.damped_velocity`, without that one's tolerance.
 
+    What the fibers bear, share * factor + damping * velocity, is a polynomial on each section of the curve too.
+    """
+    c, share, wanted = curves.velocity, active * by_length, divide(tendon, cos) - elastic
 
-def _section(c: Any, x: Any, count: int) -> list[Any]:
-    """Start, scale and coefficients of the section that has x."""
+    def borne(velocity: Any, factor: Any) -> Any:
+        return share * factor + m.damping * velocity
+
+    count = int(plain(c[SECTIONS]))
     first = HEAD + count
+    knots = [borne(c[HEAD + k], c[first + SECTION * (k + 1) + Y]) for k in range(count - 1)]
+    start, _, *rest = _section(c, [wanted >= knot for knot in knots])
+    of_x, of_y = [start, *rest[:5]], rest[5:]
+    low, high = (borne(c[end], c[end + 1]) for end in (FIRST, LAST))
+    off = _between(wanted, low, high)
+    both = [borne(*pair) for pair in zip(of_x, of_y, strict=True)]
+    both[0] -= off
+    u = _place(both, divide(-both[0], sum(both[1:])))
+    velocity, factor = _value(of_x, u), _value(of_y, u)
+    for test, end, edge in ((wanted < low, FIRST, low), (wanted > high, LAST, high)):
+        beyond = divide(wanted - edge, borne(1.0, c[end + 2]))
+        velocity = casadi.if_else(test, c[end] + beyond, velocity)
+        factor = casadi.if_else(test, c[end + 1] + c[end + 2] * beyond, factor)
+    return True, velocity, factor
+
+
+def _section(c: Any, beyond: Sequence[Any]) -> list[Any]:
+    """Start, scale and coefficients of the section behind the last of the ends that something is beyond."""
+    first = HEAD + len(beyond) + 1
     places = [START, SCALE, *range(X, Y + 6)]
     result = [c[first + place] for place in places]
-    for number in range(1, count):
-        beyond = x >= c[HEAD + number - 1]
+    for number, test in enumerate(beyond, 1):
         at = first + SECTION * number
-        result = [casadi.if_else(beyond, c[at + place], own) for place, own in zip(places, result, strict=True)]
+        result = [casadi.if_else(test, c[at + place], own) for place, own in zip(places, result, strict=True)]
     return result
 
 
-def _place(x: Sequence[Any], off: Any, u: Any) -> Any:
-    """u at which the polynomial of x is `off` beyond its first end, from a first guess on."""
+def _place(c: Sequence[Any], u: Any) -> Any:
+    """The zero of a polynomial that rises from u = 0 to 1.
+
+    The search has no derivatives: what it finds is rounded to a grid as fine as its digits. A last step of Halley's
+    method, whose error is the third power of that before, brings first and second derivatives with it.
+    """
     for _ in range(STEPS):
-        value, slope = _value([0.0, *x], u) - off, _slope([0.0, *x], u)
-        bend = x[1] + u * (3.0 * x[2] + u * (6.0 * x[3] + u * (10.0 * x[4])))
-        divisor = slope * slope - value * bend
-        step = divide(value * slope, casadi.if_else(divisor > 0.0, divisor, 1.0))
-        u = _between(u - casadi.if_else(divisor > 0.0, step, 0.0), 0.0, 1.0)
-    return u
+        u = _between(_better(c, u), 0.0, 1.0)
+    return _better(c, casadi.floor(u * GRID) / GRID)
+
+
+def _better(c: Sequence[Any], u: Any) -> Any:
+    """A step of Halley's method."""
+    value, slope = _value(c, u), _slope(c, u)
+    divisor = slope * slope - value * _slope(_derivative(c), u) / 2.0
+    return u - casadi.if_else(divisor > 0.0, divide(value * slope, casadi.if_else(divisor > 0.0, divisor, 1.0)), 0.0)
 
 
 def _between(x: Any, low: Any, high: Any) -> Any:
@@ -84,4 +103,8 @@ def _value(c: Sequence[Any], u: Any) -> Any:
 
 
 def _slope(c: Sequence[Any], u: Any) -> Any:
-    return _value([k * coefficient for k, coefficient in enumerate(c)][1:], u)
+    return _value(_derivative(c), u)
+
+
+def _derivative(c: Sequence[Any]) -> list[Any]:
+    return [k * coefficient for k, coefficient in enumerate(c)][1:]

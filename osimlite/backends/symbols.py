@@ -280,13 +280,12 @@ def whole(value: Any) -> int:
 
 
 def root(value: Any) -> Any:
-    """`sqrt`; its derivative at a square that was kept from below zero is 0."""
+    """`sqrt`; its derivative at 0, and at a square that was kept from below zero, is 0."""
     if not is_symbol(value):
         return math.sqrt(plain(value))
-    if value.op() == casadi.OP_FMAX:
-        with counting(value > 0.0):
-            return casadi.if_else(value > 0.0, casadi.sqrt(safe(value)), 0.0)
-    return casadi.sqrt(safe(value))
+    test = value > 0.0 if value.op() == casadi.OP_FMAX else value != 0.0
+    with counting(test):
+        return casadi.if_else(test, casadi.sqrt(safe(value)), 0.0)
 
 
 def length_of(*values: Any) -> Any:

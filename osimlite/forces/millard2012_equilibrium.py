@@ -22,6 +22,7 @@ from osimlite.forces.muscles import (
 )
 
 VELOCITY_ROUNDS, LENGTH_ROUNDS = 20, 200
+VELOCITY_TOLERANCE = 1e-10  # of the strength
 """Newton's steps in the search for a velocity, and for an equilibrium."""
 SMALLEST = 2.0**-26
 """Least part of a step, and the step (m) in the other direction where there is none."""
@@ -145,7 +146,7 @@ def damped_velocity(
     Returns:
         Whether there is one, the velocity, and the factor of the active force there.
     """
-    tolerance = max(1e-10 * m.strength, 100.0 * SIGNIFICANT)
+    tolerance = max(VELOCITY_TOLERANCE * m.strength, 100.0 * SIGNIFICANT)
     guess = (tendon / max(cos, 0.01) - elastic) / (max(active, 0.01) * max(by_length, 0.01))
     velocity, _ = curve_value(curves.inverse, guess)
     velocity, factor = min(max(velocity, -1.0), 1.0), 0.0
