@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 from osimlite.backends.symbols import casadi, divide, is_symbol, plain
@@ -78,16 +79,24 @@ def _place(c: Sequence[Any], u: Any) -> Any:
     The search has no derivatives: what it finds is rounded to a grid as fine as its digits. A last step of Halley's
     method, whose error is the third power of that before, brings first and second derivatives with it.
     """
+    return _search()(casadi.vertcat(*c), u)
+
+
+@cache
+def _search() -> Any:
+    """`_place` as a function, which CasADi writes into expressions sooner than Python."""
+    given = casadi.SX.sym("c", 6), casadi.SX.sym("u")
+    c, u = casadi.vertsplit(given[0]), given[1]
     for _ in range(STEPS):
         u = _between(_better(c, u), 0.0, 1.0)
-    return _better(c, casadi.floor(u * GRID) / GRID)
+    return casadi.Function("search", given, [_better(c, casadi.floor(u * GRID) / GRID)])
 
 
 def _better(c: Sequence[Any], u: Any) -> Any:
     """A step of Halley's method."""
     value, slope = _value(c, u), _slope(c, u)
     divisor = slope * slope - value * _slope(_derivative(c), u) / 2.0
-    return u - casadi.if_else(divisor > 0.0, divide(value * slope, casadi.if_else(divisor > 0.0, divisor, 1.0)), 0.0)
+    return u - casadi.if_else(divisor > 0.0, value * slope / casadi.if_else(divisor > 0.0, divisor, 1.0), 0.0)
 
 
 def _between(x: Any, low: Any, high: Any) -> Any:

@@ -102,6 +102,10 @@ class Jet:
     __hash__ = None  # type: ignore[assignment]
 
 
+def _bell(x: float) -> float:
+    return 2.0 / math.sqrt(math.pi) * math.exp(-x * x)
+
+
 SLOPES: dict[str, Callable[[float, float], tuple[float, float]]] = {
     "sin": lambda x, f: (math.cos(x), -f),
     "cos": lambda x, f: (-math.sin(x), -f),
@@ -117,8 +121,8 @@ SLOPES: dict[str, Callable[[float, float], tuple[float, float]]] = {
     "sinh": lambda x, f: (math.cosh(x), f),
     "cosh": lambda x, f: (math.sinh(x), f),
     "tanh": lambda x, f: (1.0 - f * f, -2.0 * f * (1.0 - f * f)),
-    "erf": lambda x, f: ((s := 2.0 / math.sqrt(math.pi) * math.exp(-x * x)), -2.0 * x * s),
-    "erfc": lambda x, f: ((s := -2.0 / math.sqrt(math.pi) * math.exp(-x * x)), -2.0 * x * s),
+    "erf": lambda x, f: (_bell(x), -2.0 * x * _bell(x)),
+    "erfc": lambda x, f: (-_bell(x), 2.0 * x * _bell(x)),
     "sqrt": lambda x, f: (0.5 / f, -0.25 / (f * x)) if x > 0.0 else (0.0, 0.0),
 }
 """Of a function at x, where its value is f, the first and second derivatives."""
@@ -126,7 +130,14 @@ SLOPES: dict[str, Callable[[float, float], tuple[float, float]]] = {
 
 def _of_one(name: str) -> Callable[[Any], Any]:
     plain, slopes = getattr(math, name), SLOPES[name]
-    return lambda x: x.through(f := plain(x.v), *slopes(x.v, f)) if isinstance(x, Jet) else plain(x)
+
+    def function(x: Any) -> Any:
+        if not isinstance(x, Jet):
+            return plain(x)
+        value = plain(x.v)
+        return x.through(value, *slopes(x.v, value))
+
+    return function
 
 
 def _angle(y: Any, x: Any) -> Any:
