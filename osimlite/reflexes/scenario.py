@@ -13,11 +13,12 @@ from osimlite.errors import SettingError, SimulationError
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.reflexes.controllers import CONTROLLERS, Reflexes
-from osimlite.reflexes.measures import MEASURES, Measure
+from osimlite.reflexes.measures import MEASURES, Criteria, Measure
 from osimlite.reflexes.parameters import Parameter, Parameters, read_par
 from osimlite.reflexes.settings import Node, found_file, read_settings
-from osimlite.reflexes.walkers import Felt, Walkers
+from osimlite.reflexes.walkers import Walkers
 from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.simulation.kernels.walks import BEGIN, FEEL, GOING, START, STEPS
 from osimlite.text import listed, or_known
 
 OPTIMIZERS = "CmaOptimizer", "CmaPoolOptimizer"
@@ -38,6 +39,8 @@ HIGH, CLOSE, TRIES = 10.0, 0.1, 100
 """How far a walker is lifted or lowered at most to carry its weight (m), how well it has to carry it, and tries."""
 LIFT = 0.1
 """M, by which it is lifted at a time."""
+AT_ONCE = 100
+"""Control steps of a call; between them Ctrl-C is heard."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +154,7 @@ class Scenario:
     def parameters(self) -> list[Parameter]:
         """All that are looked for, with the means and widths that the scenario begins with."""
         found = Parameters({})
-        Candidates(self, found)
+        Candidates(self, found, self.step)
         result = []
         for each in found.found.values():
             _, mean, std = self.begun.get(each.name, (each.mean, each.mean, each.std))
@@ -177,8 +180,7 @@ class Scenario:
         """
         if duration is not None and not duration >= self.step:
             raise SettingError(f"a walk of {duration:g} s is shorter than a control step of {self.step:g} s")
-        candidates = Candidates(self, Parameters(values, count))
-        return candidates.walk(self.duration if duration is None else duration)
+        return Candidates(self, Parameters(values, count), self.duration if duration is None else duration).walk()
 
     def walkers(self, count: int) -> Walkers:
         """So many walkers of the model; kept, as making them takes longer than a walk."""
@@ -205,19 +207,28 @@ class Scenario:
 
 
 class Candidates:
-    """Some candidates of a scenario, at their start."""
+    """Some candidates of a scenario, at their start, which are to walk for a duration (s)."""
 
-    def __init__(self, scenario: Scenario, parameters: Parameters) -> None:
-        self.scenario, self.parameters = scenario, parameters
-        self.walkers = scenario.walkers(parameters.count)
+    def __init__(self, scenario: Scenario, parameters: Parameters, duration: float) -> None:
+        self.scenario, self.parameters, self.duration = scenario, parameters, duration
+        self.walkers = walkers = scenario.walkers(parameters.count)
         self._start()
         kind, controller = scenario.controller
-        self.controller = Reflexes(controller, kind, self.walkers, parameters)
+        reflexes = Reflexes(controller, kind, walkers, parameters)
+        self._steps = round(duration / walkers.step)
         name, own = scenario.measure
-        self.measure: Measure = MEASURES[name](own, self.walkers)
+        criteria = Criteria(self._steps)
+        self.measure: Measure = MEASURES[name](own, walkers, criteria)
+        walkers.go_by(*reflexes.compiled(), *criteria.compiled(), criteria.room)
+        node = scenario.settings
+        load = node.number("initial_load", 0.2)
+        height = walkers.places.get(node.text("initial_load_dof", "/jointset/ground_pelvis/pelvis_ty/value"))
+        if load > 0.0 and height is not None:
+            for k in range(walkers.count):
+                _carry(walkers, k, height, load)
 
     def _start(self) -> None:
-        """States at the start, in which the ground carries what it is to carry."""
+        """States at the start."""
         walkers, node, scenario = self.walkers, self.scenario.settings, self.scenario
         states = walkers.copies.states
         walkers.copies.put(slice(None), np.tile(walkers.copies.start, (walkers.count, 1)))
@@ -233,11 +244,6 @@ class Candidates:
                 if _matches(path, included) and not _matches(path, excluded):
                     name = path.replace("_l/", "/").replace("_r/", "/") if symmetric else path
                     states[:, place] += self.parameters.read(offset, f"{name}.offset")
-        load = node.number("initial_load", 0.2)
-        height = walkers.places.get(node.text("initial_load_dof", "/jointset/ground_pelvis/pelvis_ty/value"))
-        if load > 0.0 and height is not None:
-            for k in range(walkers.count):
-                states[k] = _loaded(walkers, states[k], height, load)
 
     def _read_state(self, path: Path) -> None:
         walkers = self.walkers
@@ -259,42 +265,31 @@ class Candidates:
                 except ValueError:
                     raise node.error(f"'{name}' must be a number, not '{node.value}'") from None
 
-    def walk(self, duration: float) -> Walked:
+    def walk(self) -> Walked:
         """As of `Scenario.walk`."""
-        walkers, controller, measure = self.walkers, self.controller, self.measure
-        most = np.ones(len(walkers.names))
-        small = self.scenario.settings.number("initial_equilibration_activation", 0.05)
-        walkers.equilibrated(np.full((walkers.count, len(most)), small))
-        felt = walkers.felt()
-        controller.begin(felt)
-        walkers.equilibrated(np.clip(controller.inputs(felt), walkers.least, most))
-        felt = walkers.felt()
-        measure.begin(felt)
-        going, times = np.ones(walkers.count, dtype=bool), np.zeros(walkers.count)
-        rows: list[tuple[float, Array, Array, Array]] = []
-        for number in range(1, round(duration / walkers.step) + 1):
-            excitations = np.clip(controller.inputs(felt), walkers.least, most)
-            if going[0]:
-                rows.append(((number - 1) * walkers.step, felt.states[0].copy(), excitations[0], felt.loads[0]))
-            good = walkers.copies.step(excitations, ~going)
-            felt = walkers.felt()
-            controller.sensors.note(felt)
-            t = number * walkers.step
-            times[going] = t
-            going &= good
-            measure.counted(t, felt, excitations, going)
-            going &= ~measure.failed
-            if not going.any():
-                break
-        rows.append((float(times[0]), felt.states[0].copy(), excitations[0], felt.loads[0]))
-        results = measure.weighted(times, duration)
-        return Walked(results, times, measure.terms, measure.report, *self._tables(rows))
-
-    def _tables(self, rows: Sequence[tuple[float, Array, Array, Array]]) -> tuple[StoTable, StoTable, StoTable]:
         walkers = self.walkers
-        times = np.array([row[0] for row in rows])
-        states, excitations, loads = (np.array([row[k] for row in rows]) for k in (1, 2, 3))
+        small = self.scenario.settings.number("initial_equilibration_activation", 0.05)
+        walkers.equilibrated(np.full(walkers.excitations.shape, small))
+        walkers.go(BEGIN)
+        walkers.equilibrated(walkers.excitations)
+        walkers.go(START)
+        rows, going = [], list(range(walkers.count))
+        for first in range(0, self._steps, AT_ONCE):
+            rows.append(walkers.go(min(AT_ONCE, self._steps - first), going))
+            going = np.flatnonzero(walkers.progress[:, GOING]).tolist()
+            if not going:
+                break
+        rows.append(np.concatenate([walkers.copies.states[0], walkers.excitations[0], walkers.loads()[0]])[None])
+        times = walkers.step * walkers.progress[:, STEPS].astype(np.float64)
+        results = self.measure.weighted(times, self.duration)
+        return Walked(results, times, self.measure.terms, self.measure.report, *self._tables(np.concatenate(rows)))
+
+    def _tables(self, rows: Array) -> tuple[StoTable, StoTable, StoTable]:
+        walkers = self.walkers
+        times = walkers.step * np.arange(len(rows), dtype=np.float64)
         legs = tuple(f"leg{leg.side}.load" for leg in walkers.legs)
+        size = walkers.copies.states.shape[1]
+        states, excitations, loads = np.split(rows, (size, size + len(walkers.names)), axis=1)
         return (
             StoTable("states", times, tuple(walkers.places), states[:, [*walkers.places.values()]]),
             StoTable("excitations", times, tuple(walkers.names), excitations),
@@ -306,15 +301,15 @@ def _matches(path: str, patterns: Sequence[str]) -> bool:
     return any(fnmatch.fnmatchcase(path, pattern) for pattern in patterns if pattern)
 
 
-def _loaded(walkers: Walkers, state: Array, height: int, load: float) -> Array:
-    """The state with the height in which the ground carries a part of the weight, as SCONE looks for it."""
-    state = state.copy()
+def _carry(walkers: Walkers, which: int, height: int, load: float) -> None:
+    """Move a walker to the height in which the ground carries a part of the weight, as SCONE looks for it."""
+    state = walkers.copies.states[which]
     start = float(state[height])
 
     def carried(value: float) -> float:
         state[height] = value
-        felt: Felt = walkers.looked(state[None])
-        return float(felt.loads[0].sum())
+        walkers.go(FEEL, (which,))
+        return float(walkers.loads()[which].sum())
 
     top = start
     while carried(top) > load and top - start < HIGH:
@@ -326,6 +321,6 @@ def _loaded(walkers: Walkers, state: Array, height: int, load: float) -> Array:
         middle = 0.5 * (top + bottom)
         found = carried(middle)
         if abs(found - load) / load <= CLOSE:
-            return state
+            return
         top, bottom = (top, middle) if found > load else (middle, bottom)
     raise SimulationError(f"in no height the ground carries {load:g} of the weight")

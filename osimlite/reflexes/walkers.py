@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf
 from typing import Any, NamedTuple
 
@@ -10,18 +11,24 @@ import numpy as np
 from osimlite.errors import ModelError
 from osimlite.multibody.mechanism import GROUND
 from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.copies import Copies
 from osimlite.simulation.elements.contact import PairContact
-from osimlite.simulation.kernels.layout import CONTACT_WORK, LINK_WORK, MODEL, STAGE
+from osimlite.simulation.kernels.layout import OUTCOME
+from osimlite.simulation.kernels.pointers import Ints
+from osimlite.simulation.kernels.reflexes import REFLEXES
+from osimlite.simulation.kernels.senses import OF_MUSCLES, SENSES
+from osimlite.simulation.kernels.walks import COUNTS, LEGS, STEPS
 from osimlite.text import did_you_mean, listed
 
 SIDES = "_l", "_r"
 """Ends of names, left before right, which is the order of the legs."""
-OF_MUSCLES = ("fiber_length", "fiber_velocity", "tension", "active_fiber_force")
+SENSORS = {
+    "L": SENSES.LENGTHS, "V": SENSES.VELOCITIES, "F": SENSES.FORCES, "DP": SENSES.VALUES, "DV": SENSES.SPEEDS,
+}  # fmt: skip
+"""What reflexes call it."""
 
 
 class Leg(NamedTuple):
@@ -37,35 +44,8 @@ class Leg(NamedTuple):
     side: str
     base: int
     foot: int
-    pairs: tuple[int, ...]
+    pairs: range
     length: float
-
-
-@dataclass(frozen=True, eq=False)
-class Felt:
-    """All candidates at one moment.
-
-    Attributes:
-        states: (w, y).
-        lengths: of fibers, over the optimal ones (w, m).
-        velocities: of fibers, optimal lengths/s (w, m).
-        forces: of tendons along the path, over the strengths (w, m).
-        active: forces of fibers, N (w, m).
-        loads: forces of the ground on each leg, over the weight (w, l).
-        moments: of the force that limits each coordinate, N or N m; 0 where none does (w, n).
-        bodies: mass centres of all bodies in ground, m (w, b, 3).
-        centre: mass centre, m (w, 3).
-    """
-
-    states: Array
-    lengths: Array
-    velocities: Array
-    forces: Array
-    active: Array
-    loads: Array
-    moments: Array
-    bodies: Array
-    centre: Array
 
 
 class Walkers:
@@ -82,9 +62,18 @@ class Walkers:
         contact: of the forces of feet.
         longest: of the integrator's own steps, s.
 
+    Attributes:
+        senses, known: plan of the rows, and its numbers.
+        rows: what is felt of each (w, r).
+        excitations: that are held (w, m).
+        progress: what is counted of each walk (w, c), see :mod:`osimlite.simulation.kernels.walks`.
+        noted: by the criteria (w, k).
+
     Raises:
         ModelError: it has actuators that are no muscles.
     """
+
+    noted: Array
 
     def __init__(
         self,
@@ -123,33 +112,41 @@ class Walkers:
             **{path: 2 * size + n for n, path in enumerate(state.paths)},
         }
         self.activations = np.array([self.places[f"{path}/activation"] for path in self.copies.controls])
-        self._looked_at = self._places_to_look()
         self.legs = self._legs(upper, lower, contact)
+        self.senses, self.known = self._sensing()
+        self.rows, self.excitations = np.zeros((count, self.senses[SENSES.SIZE])), np.zeros((count, len(self.muscles)))
+        self.progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
+        self._driven: Ints = np.array([self.copies.places, self.activations])
+        self.engine.program.code.make_ready(("walk_several",))
 
-    def _places_to_look(self) -> list[int]:
-        structure = self.engine.structure
-        places = [place for path in self.copies.controls for place in self.engine.places_of(path, OF_MUSCLES)]
-        first = int(structure[MODEL.WORK_CONTACT])
-        for pair in range(len(self.engine.contacts)):
-            places += [first + CONTACT_WORK.SIZE * pair + CONTACT_WORK.FORCE + k for k in range(3)]
-        self._limited = []
+    def _sensing(self) -> tuple[Ints, Array]:
+        """Plan of what is felt, and its numbers; see :mod:`osimlite.simulation.kernels.senses`."""
+        engine, bodies, names = self.engine, self.mechanism.bodies, self.copies.controls
+        limits: list[int] = []
         for item in self.copies.simulation.model.components(CoordinateLimitForce):
             path = self.copies.simulation.model.tree().path_of(item)
             if item.appliesForce and str(item.coordinate) in self.coordinates:
-                self._limited.append(self.coordinates.index(str(item.coordinate)))
-                places += self.engine.places_of(path, ("force",))
-        self._links = sorted({item.link for item in self.engine.placements if item.link != GROUND})
-        for link in self._links:
-            at = int(structure[MODEL.WORK_LINK]) + LINK_WORK.SIZE * link
-            places += [*range(at + LINK_WORK.ROTATION, at + LINK_WORK.ROTATION + 9)]
-            places += [*range(at + LINK_WORK.POSITION, at + LINK_WORK.POSITION + 3)]
+                limits += self.coordinates.index(str(item.coordinate)), *engine.places_of(path, ("force",))
+        m, n, b, legs = len(names), len(self.coordinates), len(bodies), len(self.legs)
+        sizes = m, m, m, n, n, legs, m, n, 3 * b, 3
+        plan = [m, n, legs, len(limits) // 2, b, 0, *np.cumsum(sizes).tolist()]
+        plan += [place for path in names for place in engine.places_of(path, OF_MUSCLES)] + limits
+        plan += [placement.link for placement in engine.placements]
+        plan += [number for leg in self.legs for number in (leg.base, leg.foot, leg.pairs.start, leg.pairs.stop)]
         centres = []
-        for placement, body in zip(self.engine.placements, self.mechanism.bodies, strict=True):
+        for placement, body in zip(engine.placements, bodies, strict=True):
             frame = placement.frame
             centres.append(frame[:3, :3] @ body.mass_properties.center + frame[:3, 3])
-        self._centres = np.array(centres)
-        self._masses = np.array([body.mass_properties.mass for body in self.mechanism.bodies])
-        return places
+        masses = np.array([body.mass_properties.mass for body in bodies])
+        own = (
+            [self.weight, masses.sum(), self.step],
+            self.optimal,
+            self.strengths,
+            self.least,
+            np.ravel(centres),
+            masses,
+        )
+        return np.array(plan, dtype=np.int64), np.concatenate(own)
 
     def _legs(self, upper: str, lower: str, contact: str) -> list[Leg]:
         names = [body.name for body in self.mechanism.bodies]
@@ -159,7 +156,7 @@ class Walkers:
         elements = [item for item in self.copies.simulation.forces.elements if isinstance(item, PairContact)]
         first = np.cumsum([0, *(len(item.pairs) for item in elements)])
         pairs = {
-            item.path.rpartition("/")[2]: (*range(a, b),)
+            item.path.rpartition("/")[2]: range(a, b)
             for item, a, b in zip(elements, first[:-1], first[1:], strict=True)
         }
         legs = []
@@ -192,46 +189,52 @@ class Walkers:
             wanted = f"bodies '{upper}_l' and '{upper}_r', feet, and contact forces '{contact}_l' and '{contact}_r'"
             raise ModelError(f"the model has no legs, which are {wanted}{near}")
 
-    # ------------------------------------------------------------------------------------------------- states
-    def looked(self, states: Array) -> Felt:
-        """What is felt in some states (k, y)."""
-        moments = np.column_stack([np.zeros(len(states)), states])
-        found = self.engine.looked(moments, self._looked_at, STAGE.FORCE)
-        count, kinds = len(self.names), len(OF_MUSCLES)
-        muscles = found[:, : count * kinds].reshape(len(states), count, kinds)
-        at = count * kinds
-        pushes = found[:, at : at + 3 * len(self.engine.contacts)].reshape(len(states), -1, 3)
-        at += 3 * len(self.engine.contacts)
-        moments = np.zeros((len(states), len(self.coordinates)))
-        moments[:, self._limited] = found[:, at : at + len(self._limited)]
-        at += len(self._limited)
-        links = found[:, at:].reshape(len(states), len(self._links), 12)
-        bodies = np.empty((len(states), len(self._centres), 3))
-        for k, (placement, centre) in enumerate(zip(self.engine.placements, self._centres, strict=True)):
-            if placement.link == GROUND:
-                bodies[:, k] = centre
-                continue
-            link = links[:, self._links.index(placement.link)]
-            bodies[:, k] = link[:, 9:] + link[:, :9].reshape(-1, 3, 3) @ centre
-        loads = np.zeros((len(states), len(self.legs)))
-        for k, leg in enumerate(self.legs):
-            loads[:, k] = np.linalg.norm(pushes[:, list(leg.pairs)].sum(axis=1), axis=1) / self.weight
-        centre = np.einsum("b,kbi->ki", self._masses, bodies) / self._masses.sum()
-        return Felt(
-            states,
-            muscles[..., 0] / self.optimal,
-            muscles[..., 1] / self.optimal,
-            muscles[..., 2] / self.strengths,
-            muscles[..., 3],
-            loads,
-            moments,
-            bodies,
-            centre,
-        )
+    # ------------------------------------------------------------------------------------------------- walking
+    def sensor(self, kind: str, number: int) -> int:
+        """Where a row has the length (L), velocity (V) or force (F) of a muscle, or the value (DP) or speed (DV) of a
+        coordinate."""
+        return int(self.senses[SENSORS[kind]]) + number
 
-    def felt(self) -> Felt:
-        """All candidates as they are."""
-        return self.looked(self.copies.states)
+    def go_by(self, plan: Ints, numbers: Array, criteria: Ints, bounds: Array, room: int) -> None:
+        """Have walks go by reflexes (see :mod:`osimlite.simulation.kernels.reflexes`), and criteria judge them.
+
+        Args:
+            plan: of the reflexes, whose `NUMBERS` and `ROOM` are left to this.
+            numbers: of each candidate (w, r).
+            criteria: see :mod:`osimlite.simulation.kernels.criteria`.
+            bounds: their numbers.
+            room: that they need.
+        """
+        sensors = self.senses[SENSES.ACTIVE]
+        plan[REFLEXES.SENSORS], plan[REFLEXES.NUMBERS] = sensors, numbers.shape[1]
+        first = LEGS + int(plan[REFLEXES.KEPT] * sensors)
+        plan[REFLEXES.ROOM] = first + room
+        whole = np.zeros((self.count, first + room))
+        self.noted = whole[:, first:]
+        self._asked = self.senses, self.known, self._driven, plan, numbers, criteria, bounds, whole
+        self.copies.vectors[:, self.copies.places] = 0.0
+
+    def go(self, order: int, which: Sequence[int] | None = None) -> Array:
+        """Have walkers (all by default) go on by an order of :mod:`osimlite.simulation.kernels.walks`.
+
+        Returns:
+            Of each control step of the first walker the state at its start, excitations, loads.
+
+        Raises:
+            SimulationError: forces cannot be computed where they begin.
+        """
+        states = self.copies.states
+        record = np.empty((max(order, 0), states.shape[1] + len(self.names) + len(self.legs)))
+        chosen, before = range(self.count) if which is None else which, int(self.progress[0, STEPS])
+        parts = *self._asked, self.rows, self.excitations, record, self.progress, order
+        status = self.copies.walk(chosen, *parts)
+        if status != OUTCOME.OK:
+            raise self.engine.refusal(status, 0.0, states[chosen[0]].tolist())
+        return record[: int(self.progress[0, STEPS]) - before] if order > 0 else record
+
+    def loads(self) -> Array:
+        """Forces of the ground on the legs over the weight, as they were felt last (w, l)."""
+        return self.rows[:, self.senses[SENSES.LOADS] : self.senses[SENSES.ACTIVE]]
 
     def equilibrated(self, activations: Array) -> None:
         """Have muscles be in equilibrium with activations (w, m)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from math import inf
 from typing import Any
@@ -15,6 +16,7 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.kernels.layout import ITEM, MODEL
+from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.many import BatchOptions
 from osimlite.simulation.run import Simulation
 
@@ -38,6 +40,7 @@ class Copies:
     Attributes:
         states: of all copies (w, y), in the order of the engine; they are changed in place.
         controls: names of the actuators, in the order in which controls are given.
+        vectors: numbers of the model, of each copy (w, x), and `places` where they have the controls (c,).
     """
 
     def __init__(
@@ -51,18 +54,17 @@ class Copies:
         driven = own.driven({name: Constant(0.0) for name in own.names})
         self.engine.drive(driven)
         self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
-        self._places = self._places_of(driven)
+        self.places = self._places_of(driven)
         self._step = step
         options = BatchOptions(to=step, accuracy=accuracy, integrator=integrator, step_bounds=(0.0, longest))
         options.check()
         vectors = np.tile(engine.numbers, (count, 1))
         self._batch = Batch(engine, np.tile(self.start, (count, 1)), options, vectors=vectors, start_holds=True)
-        self._vectors = vectors
+        self.vectors = vectors
         self._first_step = float(self._batch.clocks[0, 1])
         self._parts = [(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE)]
-        threads = min(cores(), len(self._parts))
-        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
-        self._rooms = [self._batch.room() for _ in self._parts]
+        self._rooms = [self._batch.room() for _ in range(min(cores(), count))]
+        self._pool = ThreadPoolExecutor(len(self._rooms) - 1) if len(self._rooms) > 1 else None
 
     def _places_of(self, driven: Any) -> NDArray[np.int64]:
         """Where the numbers of the model have the controls: each is the last number of its function's table."""
@@ -82,28 +84,38 @@ class Copies:
         self._batch.states[which] = states
         self._batch.clocks[which, 1] = self._first_step
 
-    def step(self, controls: Array, rests: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
-        """Hold controls (w, c) for a step; which of the copies (w,) could go on to its end.
-
-        Args:
-            controls: of all copies.
-            rests: those that stay as they are (w,).
-        """
+    def step(self, controls: Array) -> NDArray[np.bool_]:
+        """Hold controls (w, c) for a step; which of the copies (w,) could go on to its end."""
         batch = self._batch
-        self._vectors[:, self._places] = controls
+        self.vectors[:, self.places] = controls
         # Each step is a run of its own: a method that goes by earlier steps has none, those of other copies least.
-        batch.clocks[:, 0] = 0.0 if rests is None else np.where(rests, self._step, 0.0)
+        batch.clocks[:, 0] = 0.0
         batch.counts[:] = batch.endings[:] = 0
-        if self._pool is None:
-            for room, part in zip(self._rooms, self._parts, strict=True):
-                batch.run(room, *part)
-        else:
-            work = [
-                self._pool.submit(batch.run, room, *part) for room, part in zip(self._rooms, self._parts, strict=True)
-            ]
-            for each in work:
-                each.result()
+        self.together(batch.run, self._parts)
         return (batch.endings == 0) & np.isfinite(batch.states).all(axis=1)
+
+    def walk(self, which: Sequence[int], *parts: Any) -> int:
+        """Have copies walk by :func:`osimlite.simulation.kernels.walks.walk_several`; returns what that says last."""
+        said: list[int] = []
+
+        def work(room: Floats, first: int, last: int) -> None:
+            said.append(self._batch.walk(room, *parts, first, last))
+
+        self.together(work, [(k, k + 1) for k in which])
+        return max(said)
+
+    def together(self, work: Callable[[Floats, int, int], Any], parts: Sequence[tuple[int, int]]) -> None:
+        """Have all cores do work on some of the copies, from the first to before the last, each core in a room."""
+        left = iter(parts)
+
+        def share(room: Floats) -> None:
+            for first, last in left:
+                work(room, first, last)
+
+        others = [] if self._pool is None else [self._pool.submit(share, room) for room in self._rooms[1:]]
+        share(self._rooms[0])
+        for other in others:
+            other.result()
 
     def close(self) -> None:
         """Free threads and engine."""

@@ -72,8 +72,8 @@ def test_candidates_are_single_walks_bit_for_bit(ours) -> None:
 
 
 def test_walks_begin_with_the_weight_that_is_asked_for(ours) -> None:
-    candidates = Candidates(ours, Parameters(ours.best()))
-    assert candidates.walkers.felt().loads.sum() == pytest.approx(0.5, rel=0.1)
+    candidates = Candidates(ours, Parameters(ours.best()), 1.0)
+    assert candidates.walkers.loads().sum() == pytest.approx(0.5, rel=0.1)
 
 
 def test_a_file_of_states_is_a_start(tmp_path) -> None:

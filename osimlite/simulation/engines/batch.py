@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -99,31 +99,20 @@ class Batch:
 
     def run(self, room: Floats, first: int = 0, last: int | None = None) -> None:
         """Compute the runs from `first` up to `last`; other threads compute others in rooms of theirs."""
-        vectors = self._vectors
         size = self.states.shape[1]
         first_error = int(self._engine.structure[MODEL.WORK_STATE]) + ERRORS * size
         self.errors = room[first_error : first_error + size]
+        records = self._times, self.reports, self.log, self.forces, self.events, self.peaks
+        parts = *records, self._kinds, self._levels, self.endings, first, len(self.states) if last is None else last
+        self._call("run_several", room, *parts)
+
+    def walk(self, room: Floats, *parts: Any) -> int:
+        """As `run`, with what `walks.walk_several` takes besides."""
+        return self._call("walk_several", room, self.peaks, *parts)
+
+    def _call(self, name: str, room: Floats, *parts: Any) -> int:
+        vectors, program = self._vectors, self._engine.program
         room[self._method_at :][: len(self._settings)] = self._settings
-        program = self._engine.program
-        program.run(
-            program.code.entry("run_several"),
-            program.ints,
-            vectors,
-            room,
-            vectors.shape[1] if len(vectors) > 1 else 0,
-            self._sizes,
-            self.clocks,
-            self.counts,
-            self.states,
-            self._times,
-            self.reports,
-            self.log,
-            self.forces,
-            self.events,
-            self.peaks,
-            self._kinds,
-            self._levels,
-            self.endings,
-            first,
-            len(self.states) if last is None else last,
-        )
+        each = vectors.shape[1] if len(vectors) > 1 else 0
+        own = self._sizes, self.clocks, self.counts, self.states
+        return program.run(program.code.entry(name), program.ints, vectors, room, each, *own, *parts)

@@ -17,6 +17,7 @@ LAW_MODULES = {
     "evaluate": "dynamics",
     "equilibrate": "dynamics",
     "run_several": "runs",
+    "walk_several": "walks",
     "merson": "merson",
     "euler2": "euler2",
     "adams": "multistep",
