@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 
 import casadi
@@ -233,6 +234,42 @@ def test_expressions_that_are_none(expression, variables, said, tmp_path):
         problem_of(changed)
 
 
+ONE = osimlite.MocoContactImpulseTrackingGoalGroup(external_force_name="foot")
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "said"),
+    [
+        (
+            osimlite.MocoJointReactionGoal,
+            {"joint_path": "/jointset/j2"},
+            "no joint '/jointset/j2'; did you mean '/joint",
+        ),
+        (
+            osimlite.MocoJointReactionGoal,
+            {"joint_path": "/jointset/j1", "expressed_in_frame_path": "/bodyset/b2"},
+            "no frame '/bodyset/b2'",
+        ),
+        (osimlite.MocoGeneralizedForceTrackingGoal, {}, "names no table"),
+        (osimlite.MocoGeneralizedForceTrackingGoal, {"force_paths": ["/tau2"]}, "no force '/tau2'; did you mean '/tau"),
+        (osimlite.MocoGeneralizedForceTrackingGoal, {"force_paths": ["/tau0", "/tau."]}, "match '/tau0' twice"),
+        (osimlite.MocoGeneralizedForceTrackingGoal, {"force_paths": ["/tau("]}, "the pattern '/tau\\(' is none"),
+        (osimlite.MocoContactImpulseTrackingGoal, {}, "its impulse_axis is -1"),
+        (osimlite.MocoContactImpulseTrackingGoal, {"impulse_axis": 1}, "it has 0 contact_groups"),
+        (
+            osimlite.MocoContactImpulseTrackingGoal,
+            {"impulse_axis": 1, "contact_groups": [ONE]},
+            "names no external_loads",
+        ),
+    ],
+)
+def test_loads_that_are_none(kind, given, said, tmp_path):
+    changed = study(tmp_path, "pendulum-50")
+    changed.problem.phases.goals = [kind(name="load", **given)]
+    with pytest.raises(osimlite.OsimliteError, match=said):
+        problem_of(changed)
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
@@ -259,9 +296,10 @@ def test_outputs_that_are_none(given, said, tmp_path):
 def test_what_is_not_solved_is_refused_by_name_and_place(tmp_path):
     path = study_file(tmp_path, "pendulum-50")
     text = path.read_text()
-    path.write_text(text.replace("MocoFinalTimeGoal", "MocoJointReactionGoal"))
-    line = next(k for k, words in enumerate(path.read_text().splitlines(), 1) if "<MocoJointReactionGoal" in words)
-    with pytest.raises(osimlite.OsimliteError, match="MocoJointReactionGoal 'time': goals of this class") as raised:
+    factor = '<scale_factors><MocoScaleFactor name="factor"/></scale_factors>\n'
+    path.write_text(re.sub(r"(<MocoFinalTimeGoal .*?>\n)", rf"\1{factor}", text))
+    line = next(k for k, words in enumerate(path.read_text().splitlines(), 1) if "<MocoScaleFactor" in words)
+    with pytest.raises(osimlite.OsimliteError, match="MocoScaleFactor 'factor': scale factors are not") as raised:
         solve(path)
     assert (raised.value.file, raised.value.line) == (str(path), line)
     path.write_text(text.replace('name="/tau0"', 'name="/tau2"'))
