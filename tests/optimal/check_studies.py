@@ -5,13 +5,11 @@ from __future__ import annotations
 import re
 import signal
 
-import casadi
 import numpy as np
 import pytest
 
 import osimlite
 from osimlite.moco import MocoTrajectory, evaluated, problem_of, solve
-from osimlite.optimal.hessian import Hessian
 from osimlite.optimal.program import Program
 from osimlite.simulation.files.storage import read_sto, write_sto
 from tests.optimal.studies import moco_found, moco_said, study, study_file
@@ -64,37 +62,6 @@ def test_implicit_dynamics_agree(tmp_path):
     assert implicit.success
     assert implicit.objective == pytest.approx(explicit.objective, rel=1e-4)
     assert implicit.trajectory.names["derivatives"] == ("/jointset/j0/q0/accel", "/jointset/j1/q1/accel")
-
-
-@pytest.mark.parametrize(
-    ("name", "choices"),
-    [
-        ("pendulum-50", {"multibody_dynamics_mode": "implicit"}),
-        ("squat-25", {}),
-        ("pendulum-50", {"transcription_scheme": "legendre-gauss-3"}),
-    ],
-)
-def test_derivatives(name, choices, tmp_path):
-    program = Program(problem_of(study(tmp_path, name, num_mesh_intervals=4, **choices)))
-    rng, width = np.random.default_rng(1), len(program.layout.lower)
-    w = program.layout.guess() + 0.1 * rng.normal(size=width)
-    way, step, push = rng.normal(size=width), 1e-6, rng.normal(size=len(program.labels))
-
-    def slope(at):
-        gradient, numbers = program.slopes(at)
-        return gradient, np.array(casadi.DM(program.jacobian_sparsity, numbers.tolist()).full())
-
-    def along(function):
-        return (function(w + step * way) - function(w - step * way)) / (2.0 * step)
-
-    gradient, jacobian = slope(w)
-    assert gradient @ way == pytest.approx(along(lambda at: program.values(at)[0].sum()), rel=1e-6)
-    rows = along(lambda at: program.values(at)[1])
-    assert np.abs(jacobian @ way - rows).max() <= 1e-7 * max(1.0, np.abs(rows).max())
-    hessian = Hessian(program)
-    half = np.array(casadi.DM(hessian.sparsity, hessian.numbers(w, 0.7, push).tolist()).full())
-    change = along(lambda at: 0.7 * slope(at)[0] + slope(at)[1].T @ push)
-    assert np.abs((half + np.triu(half, 1).T) @ way - change).max() <= 1e-6 * max(1.0, np.abs(change).max())
 
 
 def test_the_file_comes_back_and_starts_another_search(tmp_path):
