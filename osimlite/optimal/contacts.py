@@ -46,6 +46,8 @@ def measured_groups(goal: Goal, problem: Problem) -> list[tuple[list[str], list[
         if force.force_expressed_in_body not in ("ground", "/ground"):
             raise problem.refused(goal, f"the force '{force.name}' is along axes of {force.force_expressed_in_body}")
         labels = [f"{force.force_identifier}{axis}" for axis in "xyz"]
+        if not group.contact_force_paths:
+            raise problem.wrong(group, "it names no contact_force_paths")
         paths = [_path(goal, problem, str(path), force, group) for path in group.contact_force_paths]
         series = splines(problem, table, labels)
         groups.append((paths, series, np.array([np.abs(table[name]).max() for name in labels])))

@@ -47,8 +47,8 @@ def links(*muscles):
         )
         model.add(contact)
         parent = f"/bodyset/b{k}"
-    marker = osimlite.Marker(name="tip", socket_parent_frame=BODIES[1], location=(0.1, 0.05, 0.02))
-    model.add(marker)
+    for frame, name in zip(BODIES, ("elbow", "tip"), strict=True):
+        model.add(osimlite.Marker(name=name, socket_parent_frame=frame, location=(0.1, 0.05, 0.02)))
     for k, mode in enumerate(muscles):
         muscle = osimlite.DeGrooteFregly2016Muscle(
             name=f"muscle{k}",
@@ -101,7 +101,8 @@ def study_of(model, *goals, constraints=(), **solver):
     phase = osimlite.MocoPhase(name="phases", model=osimlite.ModelProcessor(name="model", model=model))
     phase.time_initial_bounds = osimlite.MocoInitialBounds(bounds=(0.0, 0.2))
     phase.time_final_bounds = osimlite.MocoFinalBounds(bounds=(0.6, 0.9))
-    for ending, low, high in (("activation", 0.3, 0.7), ("normalized_tendon_force", 0.2, 0.6)):
+    endings = ("activation", 0.3, 0.7), ("normalized_tendon_force", 0.2, 0.6)
+    for ending, low, high in endings if any(model.components(osimlite.DeGrooteFregly2016Muscle)) else ():
         info = osimlite.MocoVariableInfo(name=f".*/{ending}", bounds=(low, high))
         phase.state_infos_pattern.append(info)
     phase.control_infos_pattern.append(osimlite.MocoVariableInfo(name=".*", bounds=(0.1, 0.9)))
@@ -122,14 +123,15 @@ def tables(folder):
     }
     swing = np.stack([np.sin(2 * t), 0.5 * t, 0.1 * t * t, np.cos(3 * t), t, 0.2 * t], axis=1)
     write_sto(folder / "motion.sto", "", t, tuple(motion), np.column_stack([*motion.values()]))
-    write_sto(folder / "controls.sto", "", t, ("/forceset/motor0",), np.sin(3 * t)[:, None])
+    write_sto(folder / "controls.sto", "", t, ("/forceset/motor0", "/forceset/motor1"), 0.2 + swing[:, :2])
     write_sto(folder / "vectors.sto", "", t, BODIES, swing, kind="Vec3")
     half = np.stack([np.cos(t), 0 * t, 0.3 * t, np.sin(t)], axis=1)
     write_sto(folder / "turns.sto", "", t, BODIES, np.hstack([half, half[:, [0, 2, 1, 3]]]), kind="Quaternion")
     write_sto(folder / "moments.sto", "", t, ("q0_moment", "q1_moment"), swing[:, :2])
-    write_sto(folder / "loads.sto", "", t, ("f_x", "f_y", "f_z"), 20.0 * swing[:, 1:4])
-    force = osimlite.ExternalForce(name="foot", applied_to_body="b1", force_identifier="f_")
+    columns = [f"{what}_{axis}" for what in "fp" for axis in "xyz"]
+    write_sto(folder / "loads.sto", "", t, columns, np.hstack([20.0 * swing[:, 1:4], 0.1 * swing[:, :3]]))
+    force = osimlite.ExternalForce(name="foot", applied_to_body="b1", force_identifier="f_", point_identifier="p_")
     loads = osimlite.ExternalLoads(name="loads", datafile="loads.sto")
     loads.objects.append(force)
     osimlite.write(loads, folder / "loads.xml")
-    write_trc(folder / "markers.trc", t.tolist(), ("tip",), swing[:, :3].tolist())
+    write_trc(folder / "markers.trc", t.tolist(), ("tip", "elbow"), (0.1 + swing).tolist())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import numpy as np
@@ -55,10 +54,7 @@ def _pushing(goal: MocoGeneralizedForceTrackingGoal, problem: Problem) -> list[s
     forces = [path for path, part in problem.components.items() if isinstance(part, Force)]
     result: list[str] = []
     for pattern in map(str, goal.force_paths):
-        try:
-            found = [path for path in forces if re.fullmatch(pattern, path)]
-        except re.error as error:
-            raise problem.wrong(goal, f"the pattern '{pattern}' is none: {error}") from None
+        found = [*filter(problem.pattern(goal, pattern), forces)]
         if not found:
             problem.expect(goal, pattern, forces, "force")
         if twice := [path for path in found if path in result]:
