@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ import numpy as np
 
 from osimlite.errors import SettingError, UnsupportedError
 from osimlite.multibody import build_mechanism
-from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.records import replace
 from osimlite.schema.model import Model, expect_model
@@ -63,6 +63,7 @@ class CasadiModel:
         model: what moves.
         parameters: paths of numbers that stay symbols.
         folder: of the model's file.
+        apart: whether bodies that never move in one another are links of their own.
 
     Attributes:
         name: of the model.
@@ -77,13 +78,13 @@ class CasadiModel:
         constraints_kept: how many equations constrain the motion.
     """
 
-    def __init__(self, model: Model, parameters: Sequence[str], folder: Path) -> None:
+    def __init__(self, model: Model, parameters: Sequence[str], folder: Path, *, apart: bool = False) -> None:
         # Before all else: it says what is missing.
         from osimlite.backends.symbols import casadi as library
 
-        self._library, self._folder = library, folder
+        self._library, self._folder, self._model = library, folder, model
         # Whether bodies stay apart decides what is linear in masses and places.
-        self._apart = bool(parameters)
+        self._apart = apart or bool(parameters)
         self._take(model)
         self.name = model.name or "model"
         self.parameters = tuple(parameters)
@@ -254,6 +255,57 @@ class CasadiModel:
     def _speed_place(self, k: int) -> int:
         """Number among `coordinates` of a degree of freedom."""
         return self._places.index(k)
+
+    def generalized_forces(self, pushing: Collection[str]) -> Any:
+        """``generalized_forces(t, x, xdot, u, p) -> missing``: M udot + c less what gravity and some forces push.
+
+        Args:
+            pushing: paths of the forces.
+
+        Returns:
+            A ``casadi.Function`` whose result (k, 1) is in the order of `coordinates`, N and N m; constraints do not
+            push.
+        """
+        size, xdot = len(self.coordinates), self._engine_order("xdot")
+        found = self._traced.missing(xdot[size : 2 * size], pushing)
+        forces = self._in_order(found.f.cells)[size : 2 * size]
+        return self._function("generalized_forces", ("t", "x", "xdot", "u", "p"), {"missing": found.sure(forces)})
+
+    def joint_load(self, path: str, side: str) -> Any:
+        """``joint_load(t, x, xdot, u, p, multipliers) -> force, moment``: what a joint pushes one of its bodies with.
+
+        It is what all that the joint carries lacks for its accelerations; the multipliers are those of `residual`.
+
+        Args:
+            path: of the joint.
+            side: ``child`` or ``parent``.
+
+        Returns:
+            A ``casadi.Function`` of the force (3,), N, and the moment (3,), N m, about the origin of the joint's frame
+            on that side, along the axes of ground.
+        """
+        from osimlite.backends.outputs import frame_places, joint_load_columns
+
+        bodies, placements = self.mechanism.bodies, self._packed.placements
+        body = next(body for body in bodies if body.mobilizer.joint == path)
+        link = placements[bodies.index(body)].link
+        if link == (GROUND if body.parent == GROUND else placements[body.parent].link):
+            return CasadiModel(self._model, self.parameters, self._folder, apart=True).joint_load(path, side)
+        # The body that the joint carries in the tree gets what is missing there, the other one the opposite.
+        sign = 1.0 if (side == "child") != body.mobilizer.reversed else -1.0
+        size, xdot = len(self.coordinates), self._engine_order("xdot")
+        found = self._traced.missing(xdot[size : 2 * size])
+        pushes = []
+        if self.constraints_kept:
+            multipliers = self._entries("multipliers")
+            pushes = [(of, multipliers[row], unit) for (row, of), unit in self._traced.bound().result.items()]
+        joint: Any = self._model.find(path)
+        frame = self._model.tree().target(joint, f"socket_{side}_frame", getattr(joint, f"socket_{side}_frame")).path
+        places = frame_places(self.mechanism, self._packed)
+        number = [*places].index(frame)
+        origin = places[frame][0], self._fixed[1][12 * number + 9 : 12 * number + 12]
+        given = "t", "x", "xdot", "u", "p", "multipliers"
+        return self._function("joint_load", given, joint_load_columns(found, link, origin, sign, pushes))
 
     @cached_property
     def constraints(self) -> Any:

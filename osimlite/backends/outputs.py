@@ -15,8 +15,9 @@ from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.sphere_on_plane import SPHERE_ON_PLANE
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.elements.kind import DeclaredForce
-from osimlite.simulation.kernels.layout import INERTIA_AT, MODEL
+from osimlite.simulation.kernels.layout import INERTIA_AT, LINK, LINK_WORK, MODEL
 from osimlite.simulation.kernels.pack import Packed
+from osimlite.simulation.kernels.parts import link_ints
 from osimlite.simulation.kernels.paths import LENGTH, SPEED
 from osimlite.simulation.kernels.points import angular_velocity, direction, station, velocity
 
@@ -144,3 +145,36 @@ def path_entries(packed: Packed, forces: Forces, found: Evaluated) -> tuple[list
             lengths.append(found.w[record + LENGTH])
             speeds.append(found.w[record + SPEED])
     return names, found.sure(lengths), found.sure(speeds)
+
+
+def joint_load_columns(
+    found: Evaluated,
+    link: int,
+    origin: tuple[int, Sequence[Any]],
+    sign: float,
+    pushes: Sequence[tuple[int, Any, Sequence[Any]]],
+) -> dict[str, Any]:
+    """What `CasadiModel.joint_load` gives of a state.
+
+    Args:
+        found: what is missing for accelerations.
+        link: that the joint carries.
+        origin: link of the frame at whose origin the load acts, and where that is in the link (3,).
+        sign: 1 if the load acts on what the joint carries, -1 if on what carries the joint.
+        pushes: links that a constraint pushes, its multiplier, and the wrench of a unit of that.
+    """
+    beyond = {link}
+    for later in range(link + 1, found.s[MODEL.LINKS]):
+        if on_symbols(link_ints)(found.s, later)[LINK.PARENT] in beyond:
+            beyond.add(later)
+    first = found.s[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
+    wrench = casadi.vertcat(*found.w[first + LINK_WORK.WRENCH : first + LINK_WORK.WRENCH + 6])
+    for of, multiplier, unit in pushes:
+        if of in beyond:
+            wrench -= multiplier * casadi.vertcat(*unit)
+    wrench *= -sign
+    place = on_symbols(station)(found.s, found.w, origin[0], tuple(origin[1]))
+    start = found.w[first + LINK_WORK.ORIGIN : first + LINK_WORK.ORIGIN + 3]
+    arm = casadi.vertcat(*place) - casadi.vertcat(*start)
+    moment = wrench[:3] - casadi.cross(arm, wrench[3:])
+    return {"force": found.sure([wrench[3:]]), "moment": found.sure([moment])}

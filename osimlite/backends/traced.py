@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from functools import reduce
 from typing import Any
 
 from osimlite.backends import ways
 from osimlite.backends.constraints import dynamics_with
-from osimlite.backends.symbolic import on_symbols, taken
+from osimlite.backends.symbolic import on_symbols, standing_in, taken
 from osimlite.backends.symbols import Vector, casadi
 from osimlite.errors import UnsupportedError
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.linking import PYTHON, Program
 from osimlite.simulation.kernels.constrained_dynamics import bind
+from osimlite.simulation.kernels.constraint_equations import add_wrench
 from osimlite.simulation.kernels.dynamics import evaluate, inverse
 from osimlite.simulation.kernels.layout import CONSTRAINED, ITEM, MODEL, STAGE, WORK
 from osimlite.simulation.kernels.pack import Packed
@@ -88,31 +89,50 @@ class Traced:
         """All that `evaluate` finds up to a stage."""
         return self.run(lambda s, x, w, y, f: on_symbols(evaluate)(s, x, w, y, f, stage))
 
-    def missing(self, udot: Sequence[Any]) -> Evaluated:
-        """What `inverse` finds for accelerations (n,)."""
-        size = self.structure[MODEL.DOFS]
+    def missing(self, udot: Sequence[Any], pushing: Container[str] | None = None) -> Evaluated:
+        """What `inverse` finds for accelerations (n,), if of the forces only those of some paths push."""
+        size, structure = self.structure[MODEL.DOFS], [*self.structure]
+        if pushing is not None:
+            first, count = structure[MODEL.ITEM_AT], structure[MODEL.ITEMS]
+            items = [item for item in structure[first : first + count] if self._path(item) in pushing]
+            structure[MODEL.ITEMS], structure[first : first + len(items)] = len(items), items
 
         def law(s: Vector, x: Vector, w: Vector, y: Vector, f: Vector) -> None:
             for k in range(size):
                 f[size + k] = udot[k]
             on_symbols(inverse)(s, x, w, y, f, 0)
 
-        return self.run(law)
+        return self.run(law, structure)
 
     def bound(self) -> Evaluated:
-        """The equations of the constraints, see `bind`."""
+        """The equations of the constraints, see `bind`; the result has the wrench of a unit of each on each link."""
+        first = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS]
+        size = self.structure[MODEL.DOFS]
 
-        def law(s: Vector, x: Vector, w: Vector, y: Vector, f: Vector) -> None:
+        def law(s: Vector, x: Vector, w: Vector, y: Vector, f: Vector) -> dict[tuple[int, int], list[Any]]:
+            wrenches: dict[tuple[int, int], list[Any]] = {}
+            kernel = on_symbols(add_wrench)
+
+            def add(s: Vector, w: Vector, link: int, torque: Any, force: Any, row: Vector) -> None:
+                key = (row.first - first) // size, link
+                before = wrenches.get(key, [0.0] * 6)
+                wrenches[key] = [old + new for old, new in zip(before, (*torque, *force), strict=True)]
+                kernel(s, w, link, torque, force, row)
+
             on_symbols(evaluate)(s, x, w, y, f, STAGE.VELOCITY)
-            on_symbols(bind)(s, x, w, y, f)
+            with standing_in(add_wrench, add):
+                on_symbols(bind)(s, x, w, y, f)
+            return wrenches
 
         return self.run(law)
 
-    def run(self, law: Callable[[Vector, Vector, Vector, Vector, Vector], Any]) -> Evaluated:
+    def run(
+        self, law: Callable[[Vector, Vector, Vector, Vector, Vector], Any], structure: list[int] | None = None
+    ) -> Evaluated:
         """What a function of the five vectors leaves."""
 
         def run() -> Evaluated:
-            s, x = Vector(self.structure), Vector(list(self.numbers))
+            s, x = Vector(self.structure if structure is None else structure), Vector(list(self.numbers))
             w, y = Vector([0.0] * self.structure[MODEL.WORK_SIZE]), Vector(list(self._y))
             f = Vector([0.0] * len(self._y))
             w[WORK.TIME] = self._t

@@ -3,14 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from osimlite.errors import DocumentError, UnsupportedError
-from osimlite.schema.base import Object
+from osimlite.errors import DocumentError, OsimliteError, UnsupportedError
+from osimlite.schema.base import Component, Object, Unknown
+from osimlite.schema.fields import Value, domain_test
+from osimlite.schema.registry import MODULES
+from osimlite.schema.specs import FieldSpec, value_specs
 from osimlite.simulation.files.storage import beside
-from osimlite.text import did_you_mean
+from osimlite.text import did_you_mean, listed
+
+
+@contextmanager
+def in_file(file: object) -> Iterator[None]:
+    """Errors that name no file are about this one, if it is one."""
+    try:
+        yield
+    except OsimliteError as error:
+        if error.file is None and isinstance(file, str | Path):
+            error.file = str(file)
+        raise
 
 
 class Asked:
@@ -33,7 +48,7 @@ class Asked:
         """Where a part of the study stands: objects know no lines, but their tags and names are in the text."""
         if self.file is None:
             return {}
-        tags = re.compile(rf"<{re.escape(type(part).tag)}(\s[^>]*)?/?>")
+        tags = re.compile(rf"<{re.escape(_tag(part))}(\s[^>]*)?/?>")
         named = re.compile(rf'name="{re.escape(part.name)}"')
         try:
             lines = self.file.read_text(encoding="utf-8").splitlines()
@@ -46,12 +61,12 @@ class Asked:
     def refused(self, part: Object, reason: str) -> UnsupportedError:
         """The error of what is not solved here."""
         name = f" '{part.name}'" if part.name else ""
-        return UnsupportedError(f"{type(part).tag}{name}: {reason}", **self._placed(part))
+        return UnsupportedError(f"{_tag(part)}{name}: {reason}", **self._placed(part))
 
     def wrong(self, part: Object, reason: str) -> DocumentError:
         """The error of what cannot be."""
         name = f" '{part.name}'" if part.name else ""
-        return DocumentError(f"{type(part).tag}{name}: {reason}", **self._placed(part))
+        return DocumentError(f"{_tag(part)}{name}: {reason}", **self._placed(part))
 
     def expect(self, part: Object, name: str, known: Iterable[str], what: str) -> None:
         """Refuse a name that is none, with the nearest one that is.
@@ -62,3 +77,54 @@ class Asked:
         known = [*known]
         if name not in known:
             raise self.wrong(part, f"the model has no {what} '{name}'{did_you_mean(name, known)}")
+
+    def expect_sound(self, whole: Object) -> None:
+        """Refuse what has a part that is none, or a value that cannot be; its model is left aside.
+
+        Raises:
+            DocumentError: there is one.
+        """
+        for part in whole.walk():
+            if isinstance(part, Component) and part.model is not None:
+                continue
+            if isinstance(part, Unknown):
+                near = did_you_mean(part.class_name, MODULES) if part.class_name not in MODULES else ""
+                raise self.wrong(part, f"no object of this class has its place here{near}")
+            for spec in value_specs(type(part)):
+                value = getattr(part, spec.name)
+                for word in value if isinstance(value, tuple) else (value,):
+                    if spec.name in part.model_fields_set and (fault := _fault(spec, word)):
+                        raise self.wrong(part, f"{spec.tag} is {word!r}{fault}")
+            for name in ("bounds", "initial_bounds", "final_bounds"):
+                ends = getattr(part, name, ())
+                if len(ends) == 2 and isinstance(ends[0], float) and ends[0] > ends[1]:
+                    raise self.wrong(part, f"{name} from {ends[0]:g} to {ends[1]:g} leave no value")
+
+    def pattern(self, part: Object, text: str) -> Callable[[str], Any]:
+        """What tells whether a name matches a pattern.
+
+        Raises:
+            DocumentError: it is none.
+        """
+        try:
+            return re.compile(text).fullmatch
+        except re.error as error:
+            raise self.wrong(part, f"'{text}' is no pattern: {error}") from None
+
+
+def _fault(spec: FieldSpec, word: Any) -> str:
+    """What is wrong with a number or a word of a property; nothing if all is right."""
+    kind = spec.kind
+    if not isinstance(kind, Value) or word is None:
+        return ""
+    if kind.choices and word not in kind.choices:
+        return f"; it can be {listed(map(repr, kind.choices))}{did_you_mean(str(word), map(str, kind.choices))}"
+    if isinstance(word, float) and word != word:
+        return ", which is no number"
+    if kind.domain and kind.scalar in ("double", "int") and not domain_test(kind.domain)(word):
+        return f"; it has to be {kind.domain}"
+    return ""
+
+
+def _tag(part: Object) -> str:
+    return part.class_name if isinstance(part, Unknown) else type(part).tag

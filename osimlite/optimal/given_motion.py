@@ -112,7 +112,7 @@ class GivenMotion:
         """
         raise UnsupportedError("goals of poses, forces or markers are not computed where the motion is given")
 
-    frames = outputs
+    frames = joint_load = generalized_forces = outputs
 
     def numbers(self, times: Array) -> Array:
         """What is known at times (t,), one row each: lengths and speeds of m paths, what n coordinates need, and what

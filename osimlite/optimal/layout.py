@@ -76,6 +76,10 @@ class Layout:
                     size += 1
             self.places.append(np.arange(first, size))
         self.lower, self.upper = np.array(lows, float), np.array(highs, float)
+        for place in np.flatnonzero(~(self.lower <= self.upper))[:1]:
+            ends = f"from {self.lower[place]:g} to {self.upper[place]:g}"
+            message = f"all bounds of '{self.name_at(place)}' together leave no value ({ends})"
+            raise problem.wrong(problem.phase, message)
 
     def guess(self) -> Array:
         """The middle between the bounds of each, as Moco begins."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from importlib import import_module
@@ -14,6 +13,7 @@ import numpy as np
 
 from osimlite._load import module_name
 from osimlite.backends.functions import casadi as functions_of
+from osimlite.errors import SettingError
 from osimlite.modifying.processing import processed
 from osimlite.multibody.spatial import Array
 from osimlite.optimal.asked import Asked
@@ -75,6 +75,7 @@ class Problem(Asked):
         super().__init__(file, folder)
         self.tables = tables or {}
         self.study = study
+        self.expect_sound(study)
         self.phase = study.problem.phases
         self.series: list[Series] = []
         if not isinstance(study.solver, MocoCasADiSolver):
@@ -86,6 +87,8 @@ class Problem(Asked):
         self._refuse_parts()
         paths = {parameter.name: self.parameter_paths(parameter) for parameter in self.phase.parameters}
         self.functions: Any = self._functions([path for own in paths.values() for path in own], motion)
+        if not self.functions.states:
+            raise self.wrong(self.phase, "its model has no states: nothing moves in it")
         self.parameters: dict[str, Range] = {
             parameter.name: range_of(parameter.moco_bounds) or FREE for parameter in self.phase.parameters
         }
@@ -97,6 +100,10 @@ class Problem(Asked):
             range_of(self.phase.time_initial_bounds) or FREE,
             range_of(self.phase.time_final_bounds) or FREE,
         )
+        if self.times[1][1] <= self.times[0][0]:
+            ends = self.times[1][1], self.times[0][0]
+            message = "the phase ends at {:g} s at the latest, and begins at {:g} s at the earliest".format(*ends)
+            raise self.wrong(self.phase.time_final_bounds, message)
         self.constraint_names = self._constraint_names()
         self.grid = Grid.of(scheme_named(self.solver.transcription_scheme), self._mesh())
         self.dynamics = Dynamics(self) if motion is None else GivenDynamics(self)
@@ -120,7 +127,7 @@ class Problem(Asked):
             self.expect(part, name, names, what)
         found = dict.fromkeys(names, 1.0)
         for weight in by_pattern.objects if by_pattern is not None else ():
-            matches = re.compile(weight.name).fullmatch
+            matches = self.pattern(weight, weight.name)
             found |= {name: weight.weight for name in names if matches(name)}
         return [*(found | own).values()]
 
@@ -163,7 +170,12 @@ class Problem(Asked):
 
     def _functions(self, parameters: list[str], motion: Motion | None) -> Any:
         if motion is None:
-            return functions_of(self.model, parameters, self.folder)
+            try:
+                return functions_of(self.model, parameters, self.folder)
+            except SettingError as error:
+                owners = (part for part in self.phase.parameters if any(
+                    f"'{path}'" in error.message for path in self.parameter_paths(part)))  # fmt: skip
+                raise self.wrong(next(owners, self.phase), error.message) from None
         if parameters:
             raise self.refused(self.phase, f"parameters ({parameters[0]}) where the motion is given")
         return GivenMotion(self.model, motion, self.folder)
@@ -209,6 +221,8 @@ class Problem(Asked):
                 yield MocoControlGoal(name=name, weight=weight), integral(partial(_squares, part))
 
     def _expect_infos(self) -> None:
+        for pattern in (*self.phase.state_infos_pattern, *self.phase.control_infos_pattern):
+            self.pattern(pattern, pattern.name)
         for infos, known, what in (
             (self.phase.state_infos, self.functions.states, "state"),
             (self.phase.control_infos, self.functions.controls, "control"),

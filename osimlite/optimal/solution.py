@@ -9,6 +9,7 @@ from typing import Any
 from osimlite.document.reader import read_document
 from osimlite.document.source import Source
 from osimlite.errors import OsimliteError
+from osimlite.optimal.asked import in_file
 from osimlite.optimal.ipopt import Progress, Violation, violations
 from osimlite.optimal.ipopt import solve as search
 from osimlite.optimal.problem import Problem
@@ -89,8 +90,8 @@ def solve(
         UnsupportedError: there is something in it that is not solved here; it says what and where.
         OsimliteError: the study cannot be read, or is none.
     """
-    program = Program(problem_of(study, folder))
-    return solved(program, guess, tell)
+    with in_file(study):
+        return solved(Program(problem_of(study, folder)), guess, tell)
 
 
 def problem_of(study: str | Path | MocoStudy, folder: str | Path | None = None) -> Problem:
@@ -105,8 +106,9 @@ def problem_of(study: str | Path | MocoStudy, folder: str | Path | None = None) 
     """
     if isinstance(study, MocoStudy):
         return Problem(study, folder=None if folder is None else Path(folder))
-    top: Any = read_document(Source.of_file(Path(study)), of=MocoStudy).top
-    return Problem(top, Path(study))
+    with in_file(study):
+        top: Any = read_document(Source.of_file(Path(study)), of=MocoStudy).top
+        return Problem(top, Path(study))
 
 
 def solved(

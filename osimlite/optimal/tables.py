@@ -28,6 +28,9 @@ from osimlite.simulation.lowpass import lowpassed
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
 
+SLACK = 1e-6
+"""By how much a motion may be longer than the data that it follows, s."""
+
 
 def table_of(problem: Problem, part: Object, processor: TableProcessor) -> StoTable:
     """The table of a processor, in rad.
@@ -113,9 +116,16 @@ def splines(problem: Problem, table: StoTable, columns: list[str]) -> list[Serie
     """Splines of fifth degree through columns of a table, as OpenSim's GCVSplineSet.
 
     Raises:
-        DocumentError: a column is not there, has gaps, or is too short.
+        DocumentError: a column is not there, has gaps, or is too short for the motion.
     """
     expect_columns(table, columns)
+    first, last = float(table.times[0]), float(table.times[-1])
+    start, end = problem.times[0][1], problem.times[1][0]
+    if start < first - SLACK or end > last + SLACK:
+        message = (
+            f"it has data from {first:g} s to {last:g} s, and the motion is at least from {start:g} s to {end:g} s"
+        )
+        raise DocumentError(message, file=table.file)
     curves = Curves(table.times, np.column_stack([table.times, *(table[name] for name in columns)])[:, 1:])
     return [problem.given(partial(_column, curves, k)) for k in range(len(columns))]
 
@@ -135,6 +145,8 @@ def expect_columns(table: StoTable, columns: Sequence[str]) -> None:
     if len(table.times) < FEWEST:
         message = f"it has {len(table.times)} times; splines of fifth degree take {FEWEST} at least"
         raise DocumentError(message, file=table.file)
+    if not (np.diff(table.times) > 0.0).all():
+        raise DocumentError("its times do not rise", file=table.file)
     for name in columns:
         if name not in table.columns:
             raise DocumentError(f"there is no column '{name}'", file=table.file)

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Any
 from osimlite.backends.symbolic import on_symbols
 from osimlite.backends.symbols import casadi
 from osimlite.forces.muscles import MuscleInputs
-from osimlite.forces.smooth_muscles import BELOW, SmoothMuscle, SmoothTendon, degroote_residual
+from osimlite.forces.smooth_muscles import (
+    BELOW,
+    SmoothMuscle,
+    SmoothTendon,
+    degroote_active,
+    degroote_factor,
+    degroote_passive,
+    degroote_residual,
+    smooth_tendon_length,
+)
 from osimlite.optimal.point import Formula, Point
 from osimlite.schema.muscles import DeGrooteFregly2016Muscle
 
@@ -66,3 +75,30 @@ class Tendons:
             given = lengths[place], speeds[place] - stretch, point.control(path), activation, 0.0, 0.0, force
             rows.append(residual(force, MuscleInputs(*given), muscle, tendon))
         return [f"{path} equilibrium" for path in self.paths], casadi.vertcat(*rows)
+
+    def drifts(self, point: Point) -> Formula:
+        """By how much the rate of the force of the fibers along each tendon exceeds that of the tendon, N/s.
+
+        Fibers are springs there: neither the activation nor the force's factor by the velocity changes
+        (M. Millard et al., Journal of Biomechanical Engineering 135, 2013, A6).
+        """
+        functions, rows = self.problem.functions, [casadi.SX(0, 1)]
+        lengths, speeds = self.problem.dynamics.path_lengths(point)
+        for path, muscle, tendon in self.muscles:
+            place, state = functions.path_names.index(path), f"{path}/normalized_tendon_force"
+            force, rate = point.state(state), point.rates[functions.states.index(state)]
+            activation = point.state(f"{path}/activation") if muscle.follows else point.control(path)
+            along = casadi.SX.sym("along")
+            length = casadi.sqrt(along**2 + muscle.height**2)
+            fiber = speeds[place] - muscle.slack * rate / (tendon.growth * (force + BELOW))
+            velocity = casadi.SX.sym("velocity")
+            active = activation * on_symbols(degroote_active)(length / muscle.optimal, muscle.scale)
+            passive, _ = on_symbols(degroote_passive)(length / muscle.optimal, tendon.passive_strain)
+            springs = passive * muscle.passive + muscle.damping * velocity
+            borne = active * on_symbols(degroote_factor)(velocity) + springs
+            stiffness = casadi.jacobian(borne * along / length, along)
+            now = lengths[place] - muscle.slack * on_symbols(smooth_tendon_length)(force, tendon.growth)
+            moves = fiber * casadi.substitute(along / length, along, now) / (muscle.fastest * muscle.optimal)
+            stiffness = casadi.substitute(stiffness, casadi.vertcat(along, velocity), casadi.vertcat(now, moves))
+            rows.append(muscle.strength * (stiffness * fiber - rate))
+        return casadi.vertcat(*rows)

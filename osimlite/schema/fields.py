@@ -7,6 +7,7 @@ is the business of :mod:`osimlite.document.lexical`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
@@ -330,3 +331,24 @@ Many = Annotated[list[T], Held("list")]
 LegacyUnnamed = Annotated[T, Held("unnamed", legacy=True)]
 LegacyMany = Annotated[list[T], Held("list", legacy=True)]
 LegacyOptional = Annotated[T | None, Held("optional", legacy=True)]
+
+
+def domain_test(domain: str) -> Callable[[float], bool]:
+    """The test that a domain such as ``"> 0"``, ``">= 1"``, ``"0 to 1"`` or ``">= 0 or -1"`` stands for."""
+    domain, _, besides = domain.partition(" or ")
+    if besides:
+        inside, alone = domain_test(domain), float(besides)
+        return lambda value: value == alone or inside(value)
+    between = re.fullmatch(r"(\S+) to (\S+)", domain)
+    if between:
+        low, high = float(between[1]), float(between[2])
+        return lambda value: low <= value <= high
+    sign, _, bound = domain.partition(" ")
+    limit = float(bound)
+    return {
+        ">": lambda value: value > limit,
+        ">=": lambda value: value >= limit,
+        "<": lambda value: value < limit,
+        "<=": lambda value: value <= limit,
+        "!=": lambda value: value != limit,
+    }[sign]

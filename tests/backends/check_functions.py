@@ -190,6 +190,37 @@ def test_parameters_stay_symbols():
     assert off(np.array(f.dynamics(both.t, x, [], f.p)).ravel(), both.derivative(x)) < 1e-11
 
 
+def test_constraints_of_welded_bodies_do_not_depend_on_what_is_a_parameter():
+    """With parameters welded bodies are links of their own, here behind one that a hinge carries."""
+    model = osimlite.Model(name="welded")
+    inertia = (0.1, 0.2, 0.3, 0.0, 0.0, 0.0)
+    joints = [
+        ("arm", "/ground", osimlite.PinJoint),
+        ("side", "arm", osimlite.PinJoint),
+        ("load", "arm", osimlite.WeldJoint),
+    ]
+    for name, parent, kind in joints:
+        body = osimlite.Body(name=name, mass=1.0, mass_center=(0.1, 0.0, 0.0), inertia=inertia)
+        model.add(body)
+        frame = parent if parent == "/ground" else f"/bodyset/{parent}"
+        model.add(kind(name=f"{name}_joint", socket_parent_frame=frame, socket_child_frame=body))
+    model.add(
+        osimlite.ConstantDistanceConstraint(
+            name="held",
+            socket_body_1="/ground",
+            socket_body_2="/bodyset/load",
+            location_body_1=(0.0, 1.0, 0.0),
+            location_body_2=(1.0, 0.0, 0.0),
+            constant_distance=2.0**0.5,
+        )
+    )
+    plain, apart = osimlite.casadi(model), osimlite.casadi(model, ["/bodyset/arm/mass"])
+    x = plain.x
+    for one, other in zip(plain.constraints(0, x, x, []), apart.constraints(0, x, x, apart.p), strict=True):
+        np.testing.assert_allclose(matrix(one), matrix(other), rtol=0, atol=1e-14)
+    assert matrix(apart.constraints(0, x, x, apart.p)[3])[0, 0] == pytest.approx(-(0.5**0.5))
+
+
 def test_a_number_that_is_no_parameter_is_refused():
     model = model_named("furthest-walker")
     with pytest.raises(osimlite.OsimliteError, match="no number '/bodyset/nobody/mass'"):

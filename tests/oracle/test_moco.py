@@ -213,6 +213,81 @@ def test_outputs(tmp_path):
     assert success and high < 1e-3
 
 
+OUR_LOADS = """
+import json
+from osimlite import moco
+from osimlite.optimal.program import Program
+terms, _ = moco.evaluated(Program(moco.problem_of("study.omoco")), moco.MocoTrajectory.read("theirs.sto"))
+print(json.dumps(terms))
+"""
+
+
+@pytest.mark.parametrize("kind", ["implicit", "explicit", "constrained"])
+def test_loads(kind, tmp_path):
+    """After one of its iterations Moco's goals of loads of joints, coordinates, feet and tendons are found here."""
+    osim = pytest.importorskip("opensim")
+    model = osim.ModelFactory.createDoublePendulum()
+    turn = osim.Vec3(0.0, 0.0, -np.pi / 2)
+    floor = osim.ContactHalfSpace(osim.Vec3(0.0, -0.6, 0.0), turn, model.getGround(), "floor")
+    model.addContactGeometry(floor)
+    b1 = model.getBodySet().get(1)
+    for number in range(2):
+        sphere = osim.ContactSphere(0.1, osim.Vec3(0.02 - 0.1 * number, -0.05, 0.01), b1, f"sphere{number}")
+        model.addContactGeometry(sphere)
+        model.addComponent(osim.SmoothSphereHalfSpaceForce(f"contact{number}", sphere, floor))
+    # A body that is welded to the second one, and one on a hinge of that.
+    middle, inertia = osim.Vec3(0.01, 0.02, -0.03), osim.Inertia(0.01, 0.02, 0.03)
+    load, last = osim.Body("load", 0.7, middle, inertia), osim.Body("last", 0.4, middle, inertia)
+    at, turned = osim.Vec3(0.1, 0.2, 0.3), osim.Vec3(0.3, 0.2, 0.1)
+    zero = osim.Vec3(0)
+    weld = osim.WeldJoint("weld", b1, at, turned, load, osim.Vec3(0.0, 0.1, 0.0), zero)
+    hinge = osim.PinJoint("hinge", load, at, zero, last, osim.Vec3(0.2, 0.0, 0.1), turned)
+    hinge.updCoordinate().setName("q2")
+    for body, joint in ((load, weld), (last, hinge)):
+        model.addBody(body)
+        model.addJoint(joint)
+    for number, dynamics in enumerate(("implicit", "explicit" if kind == "explicit" else "implicit")):
+        muscle = osim.DeGrooteFregly2016Muscle()
+        muscle.setName(f"muscle{number}")
+        for name, value in (("max_isometric_force", 30.0), ("optimal_fiber_length", 0.4), ("tendon_slack_length", 0.2)):
+            getattr(muscle, f"set_{name}")(value)
+        muscle.set_ignore_tendon_compliance(False)
+        muscle.set_tendon_compliance_dynamics_mode(dynamics)
+        muscle.set_pennation_angle_at_optimal(0.2)
+        muscle.set_fiber_damping(0.1)
+        muscle.addNewPathPoint("origin", model.getGround(), osim.Vec3(0.1, 0.3, 0.1 * number))
+        muscle.addNewPathPoint("insertion", model.getBodySet().get(0), osim.Vec3(-0.7, 0.05, 0.0))
+        model.addForce(muscle)
+    if kind == "constrained":
+        place = last.findStationLocationInGround(model.initSystem(), at).to_numpy()
+        far = float(np.linalg.norm(place - [0.0, 2.0, 0.5]))
+        model.addConstraint(osim.ConstantDistanceConstraint(model.getGround(), osim.Vec3(0.0, 2.0, 0.5), last, at, far))
+        coupler = osim.CoordinateCouplerConstraint()
+        names = osim.ArrayStr()
+        names.append("q0")
+        coupler.setIndependentCoordinateNames(names)
+        coupler.setDependentCoordinateName("q1")
+        coupler.setFunction(osim.LinearFunction(0.5, 0.1))
+        model.addConstraint(coupler)
+    model.finalizeConnections()
+    model.printToXML(str(tmp_path / "model.osim"))
+    t = np.linspace(0.0, 1.0, 21)
+    labels = ["q0_moment", "q2_moment"] + ["q1_moment"] * (kind != "constrained")
+    columns = np.stack([3 * np.sin(2 * t), 1 + t * t, np.cos(t)], axis=1)[:, : len(labels)]
+    write_sto(tmp_path / "moments.sto", "", t, labels, columns)
+    write_sto(tmp_path / "loads.sto", "", t, ["f_x", "f_y", "f_z"], np.stack([5 * t, 20 + t, 0 * t], axis=1))
+    force = osim.ExternalForce()
+    force.setName("foot")
+    force.set_applied_to_body("b1")
+    force.set_force_identifier("f_")
+    loads = osim.ExternalLoads()
+    loads.setDataFileName("loads.sto")
+    loads.cloneAndAppend(force)
+    loads.printToXML(str(tmp_path / "loads.xml"))
+    theirs, ours = (_said(tmp_path, command) for command in (["-m", "tests.oracle.moco_loads"], ["-c", OUR_LOADS]))
+    assert ours == pytest.approx(theirs, rel=1e-9)
+
+
 TRACKED = """
 import json
 import opensim as osim

@@ -14,7 +14,7 @@ from osimlite.lint.subject import Subject, once
 from osimlite.lint.words import quantity, shown
 from osimlite.schema.base import Object
 from osimlite.schema.facts import REFUSED
-from osimlite.schema.fields import Value
+from osimlite.schema.fields import Value, domain_test
 from osimlite.schema.specs import FieldSpec, value_specs
 from osimlite.text import listed, nearest
 
@@ -235,33 +235,12 @@ def _domains(cls: type[Object]) -> tuple[tuple[FieldSpec, Callable[[float], bool
         assert isinstance(spec.kind, Value)
         domain = _domain(cls, spec)
         if domain and spec.kind.scalar in ("double", "int"):
-            result.append((spec, _test(domain)))
+            result.append((spec, domain_test(domain)))
     return tuple(result)
 
 
 def _is_rigid(item: Object) -> bool:
     return bool(getattr(item, "ignore_tendon_compliance", False))
-
-
-def _test(domain: str) -> Callable[[float], bool]:
-    """The test that a domain such as ``"> 0"``, ``">= 1"``, ``"0 to 1"`` or ``">= 0 or -1"`` stands for."""
-    domain, _, besides = domain.partition(" or ")
-    if besides:
-        inside, alone = _test(domain), float(besides)
-        return lambda value: value == alone or inside(value)
-    between = re.fullmatch(r"(\S+) to (\S+)", domain)
-    if between:
-        low, high = float(between[1]), float(between[2])
-        return lambda value: low <= value <= high
-    sign, _, bound = domain.partition(" ")
-    limit = float(bound)
-    return {
-        ">": lambda value: value > limit,
-        ">=": lambda value: value >= limit,
-        "<": lambda value: value < limit,
-        "<=": lambda value: value <= limit,
-        "!=": lambda value: value != limit,
-    }[sign]
 
 
 def _reals(subject: Subject) -> Iterator[tuple[Object, FieldSpec, Any]]:

@@ -36,6 +36,8 @@ def rows_between(
     ends = [("lower_bound", (0.0, math.inf)), ("upper_bound", (-math.inf, 0.0))]
     functions = [(getattr(constraint, name), limits) for name, limits in ends]
     functions = [pair for pair in functions if pair[0] is not None]
+    if not functions:
+        raise problem.wrong(constraint, "it has neither a lower_bound nor an upper_bound")
     if constraint.equality_with_lower:
         if constraint.lower_bound is None or constraint.upper_bound is not None:
             raise problem.wrong(constraint, "equality_with_lower needs a lower_bound and no upper_bound")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
 from osimlite.optimal.point import Formula, Point, Terms, integral
@@ -16,7 +14,7 @@ def terms(goal: MocoStateTrackingGoal, problem: Problem) -> Terms:
     """The integral of the weighted sum of squares of the states' distances from splines through the table."""
     states, table = problem.functions.states, table_of(problem, goal, goal.reference)
     weights = dict(zip(states, problem.weights(goal, goal.state_weights, None, states, "state"), strict=True))
-    matches = re.compile(goal.pattern if goal.pattern is not None else ".*").fullmatch
+    matches = problem.pattern(goal, goal.pattern if goal.pattern is not None else ".*")
     followed = [name for name in table.columns if name in states and matches(name)]
     for name in table.columns:
         if name not in followed and not goal.allow_unused_references:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 from osimlite.backends.symbols import casadi
 from osimlite.optimal.point import Terms, integral
 from osimlite.optimal.problem import Problem
@@ -15,6 +13,6 @@ def terms(goal: MocoSumSquaredStateGoal, problem: Problem) -> Terms:
     states = problem.functions.states
     weights = problem.weights(goal, goal.state_weights, None, states, "state")
     if goal.pattern is not None:
-        matches = re.compile(goal.pattern).fullmatch
+        matches = problem.pattern(goal, goal.pattern)
         weights = [weight if matches(name) else 0.0 for weight, name in zip(weights, states, strict=True)]
     return integral(lambda point: casadi.dot(casadi.DM(weights), point.x**2))

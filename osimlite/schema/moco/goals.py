@@ -37,7 +37,7 @@ from osimlite.schema.references import Named, Names
 
 DIRECTIONS = ("positive-x", "positive-y", "positive-z", "negative-x", "negative-y", "negative-z")
 
-_MEASURES = tuple(f"{load}-{axis}" for load in ("moment", "force") for axis in "xyz")
+MEASURES = tuple(f"{load}-{axis}" for load in ("moment", "force") for axis in "xyz")
 OutputPath = Annotated[str, Reference("input", "Output"), OfOutputs]
 SecondOutputPath = Annotated[str, Reference("input", "Output", required=False), OfOutputs]
 Operation = Annotated[str, word("", "addition", "subtraction", "multiplication", "division")]
@@ -170,7 +170,7 @@ class MocoJointReactionGoal(MocoGoal):
     """Which of its two frames the load acts on."""
     expressed_in_frame_path: Annotated[Named, Reference("model-path", "Frame", required=False)] = ""
     """The frame along whose axes the load counts; left out, that of `loads_frame`."""
-    reaction_measures: Annotated[tuple[str, ...], Value("string", "list", choices=_MEASURES)] = ()
+    reaction_measures: Annotated[tuple[str, ...], Value("string", "list", choices=MEASURES)] = ()
     """Components that count, such as force-x or moment-z; left out, all six."""
     reaction_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="reaction_weights")
     """Weights by components."""

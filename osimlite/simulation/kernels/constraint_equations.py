@@ -178,9 +178,11 @@ def add_force(s: Ints, w: Floats, link: int, point: Vector, force: Vector, row: 
 
 def add_wrench(s: Ints, w: Floats, link: int, torque: Vector, force: Vector, row: Floats) -> None:
     """Add what a wrench about the origin of the spatial vectors does to the coordinates."""
+    # Welded bodies may be links of their own.
+    while link >= 0 and link_ints(s, link)[LINK.FIRST_DOF] == link_ints(s, link)[LINK.END_DOF]:
+        link = link_ints(s, link)[LINK.PARENT]
     if link < 0:
         return
-    # Every link has a degree of freedom of its own.
     freedom = link_ints(s, link)[LINK.END_DOF] - 1
     while freedom >= 0:
         column = s[MODEL.WORK_COLUMN] + 6 * freedom

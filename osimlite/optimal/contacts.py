@@ -1,0 +1,71 @@
+"""Contact forces that follow measured ones: what two goals share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from osimlite.document.kept import read_anew
+from osimlite.multibody.spatial import Array
+from osimlite.optimal.point import Series
+from osimlite.optimal.problem import Problem
+from osimlite.optimal.steps import contact_at
+from osimlite.optimal.tables import splines
+from osimlite.schema.moco.tracking import MocoContactImpulseTrackingGoal, MocoContactTrackingGoal
+from osimlite.schema.prescribed import ExternalLoads
+from osimlite.simulation.elements.external_loads import loads_table
+from osimlite.text import did_you_mean
+
+Goal = MocoContactTrackingGoal | MocoContactImpulseTrackingGoal
+
+
+def measured_groups(goal: Goal, problem: Problem) -> list[tuple[list[str], list[Series], Array]]:
+    """For each group the paths of its contacts, the measured force along x, y and z of ground (N), and the greatest
+    size (3,) that this has along each.
+
+    Raises:
+        DocumentError: there are no loads, or no such force or contact.
+        UnsupportedError: what is measured is along other axes, or the half space is what it pushes.
+    """
+    loads: Any = goal.external_loads
+    folder = problem.folder
+    if loads is None:
+        if not goal.external_loads_file.strip():
+            raise problem.wrong(goal, "it has no external_loads and names no external_loads_file")
+        path = problem.place(goal.external_loads_file)
+        loads, folder = read_anew(path, ExternalLoads), path.parent
+    table = loads_table(loads, folder, None)
+    known = {force.name: force for force in loads.objects}
+    groups = []
+    for group in goal.contact_groups:
+        force = known.get(group.external_force_name)
+        if force is None:
+            near = did_you_mean(group.external_force_name, known)
+            raise problem.wrong(goal, f"the loads have no force '{group.external_force_name}'{near}")
+        if force.force_expressed_in_body not in ("ground", "/ground"):
+            raise problem.refused(goal, f"the force '{force.name}' is along axes of {force.force_expressed_in_body}")
+        labels = [f"{force.force_identifier}{axis}" for axis in "xyz"]
+        if not group.contact_force_paths:
+            raise problem.wrong(group, "it names no contact_force_paths")
+        paths = [_path(goal, problem, str(path), force, group) for path in group.contact_force_paths]
+        series = splines(problem, table, labels)
+        groups.append((paths, series, np.array([np.abs(table[name]).max() for name in labels])))
+    return groups
+
+
+def weight_of(problem: Problem) -> float:
+    """That of the model, N; its mass where there is no gravity, as in OpenSim."""
+    mechanism = problem.functions.mechanism
+    return mechanism.total_mass * (float(np.linalg.norm(mechanism.gravity)) or 1.0)
+
+
+def _path(goal: Goal, problem: Problem, name: str, force: Any, group: Any) -> str:
+    """The contact's path; its sphere has to be on the body that the measured force pushes."""
+    path, sphere = contact_at(goal, problem, name)
+    frames = str(sphere.socket_frame).split("/")
+    wanted = [force.applied_to_body, *(str(frame).rpartition("/")[2] for frame in group.alternative_frame_paths)]
+    if not any(each.rpartition("/")[2] in frames for each in wanted):
+        message = f"the sphere of '{path}' is on {'/'.join(frames)}, and '{force.name}' pushes {force.applied_to_body}"
+        raise problem.refused(goal, f"{message}; contacts whose half space is pushed are not followed here")
+    return path

@@ -1,0 +1,35 @@
+"""The load that a joint carries."""
+
+from __future__ import annotations
+
+from osimlite.backends.symbols import casadi
+from osimlite.optimal.contacts import weight_of
+from osimlite.optimal.point import Formula, Point, Terms, integral
+from osimlite.optimal.problem import Problem
+from osimlite.schema.joints import Joint
+from osimlite.schema.moco.goals import MEASURES, MocoJointReactionGoal
+
+
+def terms(goal: MocoJointReactionGoal, problem: Problem) -> Terms:
+    """The integral of the weighted sum of the squares of forces (N) and moments (N m), over the weight of the model."""
+    path, side = str(goal.joint_path), goal.loads_frame
+    problem.expect(goal, path, [key for key, part in problem.components.items() if isinstance(part, Joint)], "joint")
+    joint = problem.components[path]
+    frame = str(goal.expressed_in_frame_path)
+    if not frame:
+        name = f"socket_{side}_frame"
+        frame = problem.model.tree().target(joint, name, getattr(joint, name)).path
+    problem.expect(goal, frame, problem.functions.mechanism.frames, "frame")
+    names = goal.reaction_measures or MEASURES
+    weights = problem.weights(goal, goal.reaction_weights, None, MEASURES, "reaction measure")
+    known = dict(zip(MEASURES, weights, strict=True))
+    load = problem.functions.joint_load(path, side)
+
+    def integrand(point: Point) -> Formula:
+        force, moment = load(point.t, point.x, point.rates, point.u, point.p, point.multipliers)
+        turn = point.frame(frame).rotation.T
+        own = casadi.vertcat(turn @ moment, turn @ force)
+        return sum(known[name] * own[MEASURES.index(name)] ** 2 for name in names)
+
+    result, weight = integral(integrand), weight_of(problem)
+    return Terms(lambda ends: result.value(ends) / weight, integrand)

@@ -1,0 +1,266 @@
+"""All first and second derivatives of the nonlinear programs of every kind of study, beside differences."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import casadi
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite import optimal
+from osimlite._load import module_name
+from osimlite.moco import problem_of, problem_of_inverse, problem_of_track
+from osimlite.optimal.hessian import Hessian
+from osimlite.optimal.problem import Problem
+from osimlite.optimal.program import Program
+from tests.optimal.small import BODIES, coupled, links, study_of, tables
+from tests.optimal.studies import study as moco_study
+
+STEP = 2e-3
+"""Of Richardson's differences, whose error is that to the sixth power times the seventh derivative."""
+
+
+def dense(sparsity, numbers):
+    return np.array(casadi.DM(sparsity, numbers.tolist()).full())
+
+
+def differences(function, w, moving):
+    """Derivatives (n, ...) of an array by some of the variables: central ones, extrapolated from two steps."""
+
+    def extrapolated(way):
+        one, two, four = ((function(w + k * way) - function(w - k * way)) / (2.0 * k * STEP) for k in (0.25, 0.5, 1.0))
+        return (64.0 * one - 20.0 * two + four) / 45.0
+
+    return np.array([extrapolated(STEP * way) for way in np.eye(len(w))[moving]])
+
+
+def worst(found, wanted, name):
+    """The greatest difference over the greatest entry of its row, and where it is."""
+    off = np.abs(found - wanted) / np.maximum(1.0, np.abs(wanted).max(axis=1, keepdims=True))
+    row, column = np.unravel_index(np.argmax(off), off.shape)
+    return off[row, column], f"{name(row)} by number {column}: {found[row, column]} and {wanted[row, column]}"
+
+
+def check(study, folder, *, tolerance=1e-7, curved=True):
+    program = Program(study if isinstance(study, Problem) else problem_of(study, folder))
+    layout, rng = program.layout, np.random.default_rng(3)
+    low, high = np.maximum(layout.lower, -1.0), np.minimum(layout.upper, 1.0)
+    w = np.clip(low + (high - low) * rng.uniform(0.2, 0.8, len(low)), layout.lower, layout.upper)
+    # Where the motion is given, nothing is known of other times than those.
+    moving = np.flatnonzero(layout.lower < layout.upper)
+    push = rng.normal(size=len(program.labels))
+
+    def parts(at):
+        costs, rows = program.values(at)
+        return np.concatenate([[costs.sum()], rows])
+
+    def slopes(at):
+        gradient, numbers = program.slopes(at)
+        return np.vstack([gradient, dense(program.jacobian_sparsity, numbers)])
+
+    assert np.isfinite(parts(w)).all()
+    first = differences(parts, w, moving).T
+    off, where = worst(slopes(w)[:, moving], first, ["cost", *program.labels].__getitem__)
+    assert off < tolerance, where
+    assert np.abs(first[0]).max() > 0.0 or not program.costs
+    if not curved:
+        with pytest.raises(osimlite.OsimliteError, match="not linear in its integral"):
+            Hessian(program)
+        return
+    hessian = Hessian(program)
+    half = dense(hessian.sparsity, hessian.numbers(w, 0.7, push))
+    second = differences(lambda at: np.concatenate([[0.7], push]) @ slopes(at), w, moving)
+    off, where = worst((half + np.triu(half, 1).T)[moving], second, lambda row: layout.name_at(moving[row]))
+    assert off < tolerance, where
+
+
+def _file(name):
+    return osimlite.TableProcessor(filepath=name)
+
+
+GROUP = {"contact_force_paths": ("/forceset/contact0", "/forceset/contact1"), "external_force_name": "foot",
+         "alternative_frame_paths": BODIES}  # fmt: skip
+FOOT = [
+    osimlite.MocoStepTimeAsymmetryGoalGroup(
+        contact_force_paths=(f"/forceset/contact{k}",), foot_position_contact_force_path=f"/forceset/contact{k}"
+    )
+    for k in range(2)
+]
+PAIR = osimlite.MocoPeriodicityGoalPair
+PARAMETER = osimlite.MocoParameter(
+    name="mass", moco_bounds=osimlite.MocoBounds(bounds=(0.5, 2.0)), component_paths=(BODIES[1],), property_name="mass"
+)
+SWING = "/jointset/j0/q0/value"
+FRAMES = {"frame_paths": BODIES}
+GOALS = {
+    "MocoFinalTimeGoal": {},
+    "MocoAverageSpeedGoal": {"desired_average_speed": 0.3, "mode": "cost"},
+    "MocoInitialActivationGoal": {"mode": "cost"},
+    "MocoInitialForceEquilibriumDGFGoal": {"mode": "cost"},
+    "MocoInitialVelocityEquilibriumDGFGoal": {"mode": "cost", "weight": 1e-4},
+    "MocoControlGoal": {"exponent": 3, "divide_by_displacement": True},
+    "MocoSumSquaredStateGoal": {"divide_by_duration": True, "divide_by_mass": True},
+    "MocoExpressionBasedParameterGoal": {"expression": "m^2 + 1/m", "parameters": [PARAMETER], "variables": ("m",)},
+    "MocoPeriodicityGoal": {
+        "state_pairs": [PAIR(initial_variable=SWING)],
+        "control_pairs": [PAIR(initial_variable="/forceset/motor0", final_variable="/forceset/motor1", negate=True)],
+        "mode": "cost",
+    },
+    "MocoMarkerFinalGoal": {"point_name": "/markerset/tip", "reference_location": (0.1, 0.2, 0.3)},
+    "MocoJointReactionGoal": {"joint_path": "/jointset/j1", "loads_frame": "child"},
+    "MocoOutputGoal": {"output_path": "/bodyset/b1|linear_acceleration"},
+    "MocoInitialOutputGoal": {"output_path": "/|com_position", "output_index": 0, "exponent": 3},
+    "MocoFinalOutputGoal": {
+        "output_path": "/bodyset/b1|position",
+        "second_output_path": "/markerset/tip|velocity",
+        "operation": "addition",
+    },
+    "MocoStepTimeAsymmetryGoal": {
+        "left_contact_group": FOOT[0], "right_contact_group": FOOT[1], "contact_force_threshold": 3.0,
+        "contact_detection_smoothing": 0.01, "asymmetry_smoothing": 2.0,
+    },
+    "MocoStepLengthAsymmetryGoal": {
+        "left_foot_frame": BODIES[0], "right_foot_frame": BODIES[1], "stride_length": 0.8, "asymmetry_smoothing": 0.01,
+    },
+    "MocoStateTrackingGoal": {"reference": _file("motion.sto"), "scale_weights_with_range": False},
+    "MocoControlTrackingGoal": {"reference": _file("controls.sto")},
+    "MocoMarkerTrackingGoal": {"markers_reference": osimlite.MarkersReference(marker_file="markers.trc")},
+    "MocoTranslationTrackingGoal": FRAMES | {"translation_reference_file": "vectors.sto"},
+    "MocoOrientationTrackingGoal": FRAMES | {"rotation_reference_file": "turns.sto"},
+    "MocoAngularVelocityTrackingGoal": FRAMES | {"states_reference": _file("motion.sto")},
+    "MocoAccelerationTrackingGoal": FRAMES | {
+        "acceleration_reference_file": "vectors.sto",
+        "gravity_offset": True,
+        "express_accelerations_in_tracking_frames": True,
+    },
+    "MocoGeneralizedForceTrackingGoal": {"reference": _file("moments.sto"), "force_paths": ("/forceset/contact.",)},
+    "MocoContactTrackingGoal": {
+        "contact_groups": [osimlite.MocoContactTrackingGoalGroup(**GROUP)], "external_loads_file": "loads.xml",
+        "projection": "plane", "projection_vector": (1.0, 0.2, 0.0),
+    },
+    "MocoContactImpulseTrackingGoal": {
+        "contact_groups": [osimlite.MocoContactImpulseTrackingGoalGroup(**GROUP)], "external_loads_file": "loads.xml",
+        "impulse_axis": 1,
+    },
+}  # fmt: skip
+"""By classes of goals what they ask for."""
+PATHS = {
+    "MocoControlBoundConstraint": {
+        "control_paths": ("/forceset/motor0",),
+        "lower_bound": osimlite.Sine(amplitude=0.3, omega=3.0, phase=0.2, offset=0.1),
+        "upper_bound": osimlite.LinearFunction(coefficients=(0.5, 0.2)),
+    },
+    "MocoStateBoundConstraint": {
+        "state_paths": (SWING,), "lower_bound": osimlite.Constant(value=0.1), "equality_with_lower": True,
+    },
+    "MocoOutputBoundConstraint": {
+        "output_path": "/bodyset/b1|angular_acceleration", "upper_bound": osimlite.Constant(value=3.0),
+    },
+    "MocoFrameDistanceConstraint": {
+        "frame_pairs": [
+            osimlite.MocoFrameDistanceConstraintPair(
+                frame1_path="/ground", frame2_path=BODIES[1], minimum_distance=0.1, maximum_distance=3.0
+            )
+        ],
+    },
+}  # fmt: skip
+"""By classes of path constraints what they ask for."""
+OF_MUSCLES = "MocoInitialActivationGoal", "MocoInitialForceEquilibriumDGFGoal", "MocoInitialVelocityEquilibriumDGFGoal"
+NOT_LINEAR = "MocoStepTimeAsymmetryGoal", "MocoContactImpulseTrackingGoal"
+
+
+@pytest.mark.parametrize("kind", GOALS)
+def test_goals(kind, tmp_path):
+    tables(tmp_path)
+    model = links("implicit", "elastic") if kind in OF_MUSCLES else links()
+    study = study_of(model, getattr(osimlite, kind)(name="goal", **GOALS[kind]), transcription_scheme="trapezoidal")
+    if kind == "MocoExpressionBasedParameterGoal":
+        study.problem.phases.parameters = [PARAMETER.copy_deep()]
+    check(study, tmp_path, curved=kind not in NOT_LINEAR)
+
+
+def test_every_class_is_checked():
+    """With those of MocoTrack and MocoInverse, which are goals and constraints like others."""
+    known = {"goals": GOALS, "constraints": PATHS}
+    for package, cases in known.items():
+        folder = Path(optimal.__file__).parent / package
+        assert {file.stem for file in folder.glob("moco_*.py")} == {module_name(kind) for kind in cases}
+
+
+@pytest.mark.parametrize("everywhere", [False, True])
+@pytest.mark.parametrize("kind", PATHS)
+def test_path_constraints(kind, everywhere, tmp_path):
+    constraint = getattr(osimlite, kind)(name="path", **PATHS[kind])
+    effort = osimlite.MocoControlGoal(name="effort")
+    check(
+        study_of(links(), effort, constraints=[constraint], enforce_path_constraint_mesh_interior_points=everywhere),
+        tmp_path,
+    )
+
+
+SCHEMES = "trapezoidal", "hermite-simpson", "legendre-gauss-1", "legendre-gauss-3", "legendre-gauss-radau-3"
+IMPLICIT = {
+    "multibody_dynamics_mode": "implicit",
+    "minimize_implicit_multibody_accelerations": True,
+    "minimize_implicit_auxiliary_derivatives": True,
+}
+
+
+@pytest.mark.parametrize("mode", ["explicit", "implicit"])
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_schemes_and_dynamics(scheme, mode, tmp_path):
+    """With muscles of all kinds, a free mass, and controls that are free between nodes."""
+    choices = {"interpolate_control_mesh_interior_points": False} | (IMPLICIT if mode == "implicit" else {})
+    model = links("implicit", "elastic", "rigid")
+    study = study_of(model, osimlite.MocoControlGoal(name="effort"), transcription_scheme=scheme, **choices)
+    study.problem.phases.parameters = [PARAMETER.copy_deep()]
+    check(study, tmp_path)
+
+
+@pytest.mark.parametrize("mode", ["explicit", "implicit"])
+@pytest.mark.parametrize("scheme", [*SCHEMES, "with derivatives"])
+def test_models_with_constraints(scheme, mode, tmp_path):
+    derived = scheme == "with derivatives"
+    choices = {
+        "transcription_scheme": "hermite-simpson" if derived else scheme,
+        "enforce_constraint_derivatives": derived,
+        "minimize_lagrange_multipliers": True,
+        "multibody_dynamics_mode": mode,
+    }
+    load = osimlite.MocoJointReactionGoal(name="load", joint_path="/jointset/j1", weight=1e-3)
+    check(study_of(coupled(links()), load, **choices), tmp_path)
+
+
+def test_motions_that_are_given(tmp_path):
+    tables(tmp_path)
+    tool = osimlite.MocoInverse(
+        name="inverse",
+        model=osimlite.ModelProcessor(model=links("implicit", "elastic", "rigid")),
+        kinematics=_file("motion.sto"),
+        initial_time=0.1,
+        final_time=0.9,
+        mesh_interval=0.4,
+    )
+    check(problem_of_inverse(tool, folder=tmp_path), tmp_path)
+
+
+def test_motions_that_are_followed(tmp_path):
+    tables(tmp_path)
+    tool = osimlite.MocoTrack(
+        name="track",
+        model=osimlite.ModelProcessor(model=links()),
+        states_reference=_file("motion.sto"),
+        markers_reference=_file("markers.trc"),
+        allow_unused_references=True,
+        track_reference_position_derivatives=True,
+        initial_time=0.1,
+        final_time=0.9,
+        mesh_interval=0.4,
+    )
+    check(problem_of_track(tool, folder=tmp_path)[0], tmp_path)
+
+
+def test_a_knee_of_splines_with_muscles(tmp_path):
+    check(moco_study(tmp_path, "squat-25", num_mesh_intervals=1), tmp_path, tolerance=1e-6)

@@ -1,0 +1,69 @@
+"""Studies with one fault at random: a finding, or one sentence with the file; never a traceback, never a silent run.
+
+A hundred in all; ``OSIMLITE_FAULTS=1000 OSIMLITE_SEED=7`` asks for others.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+from itertools import islice
+from pathlib import Path
+
+import pytest
+
+from osimlite.errors import OsimliteError
+from osimlite.lint.diagnostic import merged
+from osimlite.moco import solve
+from osimlite.tools.running import FaultySetup
+from osimlite.tools.running import run as run_setup
+from tests.optimal.study_faults import faults, project
+
+WANTED = int(os.environ.get("OSIMLITE_FAULTS", "102"))
+SEED = int(os.environ.get("OSIMLITE_SEED", "1"))
+STUDIES = "followed", "placed", "pushed"
+
+
+def said_of(study):
+    """What `solve` says of a study that it refuses, and what `run` finds in it before it solves it."""
+    refusal, found = "", []
+    try:
+        solve(study)
+    except OsimliteError as error:
+        refusal = str(error)
+        assert error.file is not None, refusal
+        assert "\n" not in refusal
+        # What is wrong with the study is wrong somewhere in it.
+        if Path(error.file) == study and "is no number at the guess" not in refusal:
+            assert error.line is not None, refusal
+    else:
+        try:
+            found = run_setup(study, study.parent / "out").warnings
+        except FaultySetup as error:
+            found = merged([error.report]).findings
+    return refusal, found
+
+
+@pytest.mark.parametrize("kind", STUDIES)
+def test_a_fault_is_told(kind, tmp_path):
+    whole = project(kind, tmp_path)
+    study = tmp_path / "study.omoco"
+    assert said_of(study) == ("", [])
+    untold = []
+    for number, (sort, change) in enumerate(islice(faults(whole, random.Random(SEED)), WANTED // len(STUDIES))):
+        file = tmp_path / change.file
+        if change.text is None:
+            file.unlink()
+        else:
+            file.write_bytes(change.text.encode())
+            # Files of one length that are written within one tick of the clock look the same.
+            os.utime(file, (10 * number, 10 * number))
+        try:
+            told = any(said_of(study))
+        except Exception as error:
+            raise AssertionError(f"{sort}: {change.file}: {change.what}") from error
+        if change.sure and not told:
+            untold.append(f"{sort}: {change.file}: {change.what}")
+        file.write_bytes(whole.texts[change.file].encode())
+        os.utime(file, (10 * number + 5, 10 * number + 5))
+    assert not untold, "\n".join(untold)
