@@ -14,6 +14,7 @@ from osimlite.optimal.ipopt import Progress, Violation, violations
 from osimlite.optimal.ipopt import solve as search
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
+from osimlite.optimal.stride import stride
 from osimlite.optimal.trajectory import MocoTrajectory
 from osimlite.records import dataclass
 from osimlite.schema.moco.studies import MocoStudy
@@ -33,6 +34,7 @@ class MocoSolution:
         violations: the largest of what is not fulfilled, the largest first.
         iterations: that were taken.
         duration: of the search, s.
+        stride: the motion and what follows it, if a MocoPeriodicityGoal says that; None otherwise.
     """
 
     trajectory: MocoTrajectory
@@ -43,6 +45,7 @@ class MocoSolution:
     violations: list[Violation]
     iterations: int
     duration: float
+    stride: MocoTrajectory | None = None
 
     @property
     def states(self) -> StoTable:
@@ -131,8 +134,9 @@ def solved(
         "status": found.status,
         "success": "true" if found.success else "false",
     }
+    trajectory = MocoTrajectory.of(layout, found.w, header)
     return MocoSolution(
-        trajectory=MocoTrajectory.of(layout, found.w, header),
+        trajectory=trajectory,
         success=found.success,
         status=found.status,
         objective=float(costs.sum()),
@@ -140,6 +144,7 @@ def solved(
         violations=violations(program, found.w, rows),
         iterations=found.iterations,
         duration=found.duration,
+        stride=stride(problem, trajectory),
     )
 
 

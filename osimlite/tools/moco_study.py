@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
 
 def run(job: Job, outcome: Outcome) -> None:
-    """Solve the problem, and write the solution, whether ``write_solution`` asks for it or not."""
+    """Solve the problem, and write the solution, whether ``write_solution`` asks for it or not.
+
+    A motion that goes on as a MocoPeriodicityGoal says is written with what follows it, too, as a stride.
+    """
     # CasADi is loaded with it.
     from osimlite.optimal.problem import Problem
     from osimlite.optimal.program import Program
@@ -23,7 +26,10 @@ def run(job: Job, outcome: Outcome) -> None:
     study = job.setup
     tell = telling(outcome) if study.solver.verbosity > 0 else None
     solution = solved(Program(Problem(study, job.file)), None, tell)
-    outcome.new_table(job.in_results(f"{study.name or 'MocoStudy'}_solution.sto"), solution.trajectory.table())
+    name = study.name or "MocoStudy"
+    outcome.new_table(job.in_results(f"{name}_solution.sto"), solution.trajectory.table())
+    if solution.stride is not None:
+        outcome.new_table(job.in_results(f"{name}_stride.sto"), solution.stride.table())
     report(solution, outcome)
 
 
