@@ -132,7 +132,10 @@ class CasadiModel:
         from osimlite.backends.given_paths import SearchedPaths
 
         forces = force_elements(model, mechanism, folder=self._folder)
-        forces = replace(forces, elements=tuple(e for e in forces.elements if not isinstance(e, DeclaredProbe)))
+        # Probes are outputs, whatever they make of their results over time; some look at more than the kernels.
+        kept = (e for e in forces.elements if not (isinstance(e, DeclaredProbe) and e.kind.measure))
+        elements = (replace(e, operation="value") if isinstance(e, DeclaredProbe) else e for e in kept)
+        forces = replace(forces, elements=tuple(elements))
         infos = mechanism.coordinates
         moving = [k for k, info in enumerate(infos) if not info.locked]
         paths = in_model_order(model, [f"{infos[k].path}/value" for k in moving])
@@ -356,7 +359,8 @@ class CasadiModel:
         ``stations``, ``station_velocities``: of markers and other stations in ground (m, m/s); ``mass_center``,
         ``mass_center_velocity``; ``contact_forces``: of each pair the force in ground (N) on the second surface, or on
         the sphere, and its point (m); ``forces``: what is known of each force, such as ``tension`` (N), ``activation``,
-        ``fiber_length`` (m), ``cos_pennation``, ``active_fiber_force`` (N).
+        ``fiber_length`` (m), ``cos_pennation``, ``active_fiber_force`` (N); ``probes``: what each probe finds times its
+        gain, before it is integrated or compared over time. Probes of energies and of joints are not among them.
         """
         return self._function(
             "outputs", ("t", "x", "u", "p"), {key: column for key, (_, column) in self._outputs.items()}
@@ -371,7 +375,10 @@ class CasadiModel:
     def _outputs(self) -> dict[str, tuple[list[str], Any]]:
         from osimlite.backends.outputs import output_columns
 
-        return output_columns(self.mechanism, self._packed, self.forces, self._evaluated, self._fixed[0])
+        found = self._evaluated
+        if any(isinstance(element, DeclaredProbe) for element in self.forces.elements):
+            found = self._traced.probed()
+        return output_columns(self.mechanism, self._packed, self.forces, found, self._fixed[0])
 
     @cached_property
     def _fixed(self) -> tuple[list[Any], list[Any]]:

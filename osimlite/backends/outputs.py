@@ -15,6 +15,7 @@ from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.sphere_on_plane import SPHERE_ON_PLANE
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.elements.kind import DeclaredForce
+from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.kernels.layout import INERTIA_AT, LINK, LINK_WORK, MODEL
 from osimlite.simulation.kernels.pack import Packed
 from osimlite.simulation.kernels.parts import link_ints
@@ -88,6 +89,12 @@ def output_columns(
         if isinstance(element, DeclaredForce) and items
         for name, place in element.kind.recorded.items()
     ]
+    probed = [
+        (f"{probe.path}|{label}", probe.gain * found.w[items[-1][0] + place])
+        for probe, items in zip(forces.elements, packed.items, strict=True)
+        if isinstance(probe, DeclaredProbe)
+        for place, label in enumerate(probe.reading.labels)
+    ]
     return {
         "stations": (labels, found.sure(places)),
         "station_velocities": (labels, found.sure(speeds)),
@@ -95,6 +102,7 @@ def output_columns(
         "mass_center_velocity": ([*AXES], found.sure(rate)),
         "contact_forces": ([name for name, _ in pushed], found.sure([value for _, value in pushed])),
         "forces": ([name for name, _ in known], found.sure([value for _, value in known])),
+        "probes": ([name for name, _ in probed], found.sure([value for _, value in probed])),
     }
 
 

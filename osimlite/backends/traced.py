@@ -12,13 +12,14 @@ from osimlite.backends.symbolic import on_symbols, standing_in, taken
 from osimlite.backends.symbols import Vector, casadi
 from osimlite.errors import UnsupportedError
 from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.engines.linking import PYTHON, Program
 from osimlite.simulation.kernels.constrained_dynamics import bind
 from osimlite.simulation.kernels.constraint_equations import add_wrench
 from osimlite.simulation.kernels.dynamics import evaluate, inverse
 from osimlite.simulation.kernels.layout import CONSTRAINED, ITEM, MODEL, STAGE, WORK
 from osimlite.simulation.kernels.pack import Packed
-from osimlite.simulation.kernels.pointers import address
+from osimlite.simulation.kernels.pointers import address, call
 
 WRAPS = "its path bends around surfaces; put a FunctionBasedPath that is fitted to it in its place"
 MESH = "a mesh is in contact; take spheres and half spaces"
@@ -88,6 +89,18 @@ class Traced:
     def evaluated(self, stage: int) -> Evaluated:
         """All that `evaluate` finds up to a stage."""
         return self.run(lambda s, x, w, y, f: on_symbols(evaluate)(s, x, w, y, f, stage))
+
+    def probed(self) -> Evaluated:
+        """All that `evaluate` finds, and after it what the probes do."""
+        owned = self._packed.owners.items()
+        places = [place for place, owner in owned if isinstance(self._elements[owner], DeclaredProbe)]
+
+        def law(s: Vector, x: Vector, w: Vector, y: Vector, f: Vector) -> None:
+            on_symbols(evaluate)(s, x, w, y, f, STAGE.ACCELERATION)
+            for place in places:
+                on_symbols(call)(s[place + ITEM.LAW], s, x, w, y, f, place)
+
+        return self.run(law)
 
     def missing(self, udot: Sequence[Any], pushing: Container[str] | None = None) -> Evaluated:
         """What `inverse` finds for accelerations (n,), if of the forces only those of some paths push."""

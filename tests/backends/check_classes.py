@@ -8,18 +8,27 @@ import casadi
 import numpy as np
 import pytest
 
+import osimlite
 from osimlite.backends.constraints import independent_equations
 from osimlite.backends.traced import Traced
 from osimlite.errors import SimulationError, UnsupportedError
 from osimlite.forces import millard2012_equilibrium
 from osimlite.multibody import Mechanism
-from osimlite.schema.actuators import ActivationCoordinateActuator
+from osimlite.schema.actuators import ActivationCoordinateActuator, CoordinateActuator
 from osimlite.schema.coordinate_stops import CoordinateLinearStopForce, ExponentialCoordinateLimitForce
+from osimlite.schema.metabolics import (
+    Bhargava2004MuscleMetabolicsProbe,
+    Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter,
+    Umberger2010MuscleMetabolicsProbe,
+    Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter,
+)
 from osimlite.schema.path_actuators import ClutchedPathSpring
+from osimlite.schema.probe_types import ActuatorForceProbe, ActuatorPowerProbe, SystemEnergyProbe
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.kind import kinds
 from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.simulation.kernels.pack import pack
+from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
 from tests.backends.jets import carried
 from tests.backends.machine import Beside, off, slope
@@ -98,6 +107,37 @@ def test_paths_over_obstacles():
     slopes = np.array(f.linear(t, x, both.controls(x), f.p)[1].full())
     found = slope(lambda h: both.derivative(x + h * way), 1e-3)
     assert off(slopes @ way, found, np.abs(slopes) @ np.abs(way)) < 1e-8
+
+
+def test_probes():
+    """Every class that the kernels compute, of a muscle and a motor that move a block."""
+    model = hung(muscle("millard_damped"), (0.4, 0.6))
+    model["/jointset/slide/x"].default_value = 0.322
+    model.add(CoordinateActuator(name="motor", coordinate="x", optimal_force=3.0))
+    model.add(*(kind(name=kind.__name__, actuator_names=("all",)) for kind in (ActuatorForceProbe, ActuatorPowerProbe)))
+    model.add(SystemEnergyProbe(name="of more than kernels know"))
+    of_muscles = (
+        (Umberger2010MuscleMetabolicsProbe, Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter),
+        (Bhargava2004MuscleMetabolicsProbe, Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter),
+    )
+    for kind, parameter in of_muscles:
+        probe = kind(name=kind.__name__, report_total_metabolics_only=False, probe_operation="integrate", gain=2.0)
+        probe.metabolic_muscle_parameter_set.objects.append(parameter(name="mu"))
+        model.add(probe)
+    functions = osimlite.casadi(model)
+    engine = Simulation(model, "compiled").engine
+    place = functions.outputs.index_out("probes")
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        x = functions.x + 0.01 * rng.normal(size=len(functions.x))
+        # Integrals are states of the engine, after those of the functions.
+        y = [*x, *[0.0] * (len(engine.found()) - len(x))]
+        engine.derivative(0.3, y)
+        found = functions.outputs(0.3, x, engine.controls(), functions.p)[place]
+        results = zip(engine.probes, engine.probe_results(0.3, y), strict=True)
+        wanted = [probe.gain * value for probe, row in results if probe.kind.law for value in row]
+        assert len(wanted) == len(functions.output_names["probes"]) >= 10
+        assert off(np.array(found.full())[:, 0], np.array(wanted)) < 1e-9
 
 
 @pytest.mark.parametrize("seed", range(12))
