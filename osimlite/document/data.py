@@ -48,7 +48,7 @@ def read_data(path: str | Path) -> Model:
         text = read_file(place).decode()
     except UnicodeDecodeError as error:
         raise MissingFileError(f"cannot read the file: {error}", file=str(path)) from None
-    data = _parsed_json(text, str(path)) if place.suffix == ".json" else _parsed_yaml(text, str(path))
+    data = _parsed_json(text, str(path)) if place.suffix == ".json" else parsed_yaml(text, str(path))
     try:
         return from_data(data)
     except ModelError as error:
@@ -295,10 +295,16 @@ def _parsed_json(text: str, file: str) -> Any:
         raise DocumentError("the JSON text is nested too deeply, or has too long a number", file=file, line=1) from None
 
 
-def _parsed_yaml(text: str, file: str) -> Any:
+def parsed_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
+    """The data of a YAML text, or PyYAML's nodes, which know their lines.
+
+    Raises:
+        DocumentError: it is none; with line and column in the file.
+        MissingDependency: PyYAML is not installed.
+    """
     yaml = _yaml()
     try:
-        return yaml.safe_load(text)
+        return yaml.compose(text, yaml.SafeLoader) if with_lines else yaml.safe_load(text)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)

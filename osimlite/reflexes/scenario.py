@@ -5,6 +5,7 @@ from __future__ import annotations
 import fnmatch
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,8 +16,9 @@ from osimlite.records import dataclass
 from osimlite.reflexes.controllers import CONTROLLERS, Reflexes
 from osimlite.reflexes.measures import MEASURES, Criteria, Measure
 from osimlite.reflexes.parameters import Parameter, Parameters, read_par
-from osimlite.reflexes.settings import Node, found_file, read_settings
+from osimlite.reflexes.settings import Node, found_file, read_settings, settings_of
 from osimlite.reflexes.walkers import Walkers
+from osimlite.schema.model import Model
 from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.simulation.kernels.walks import BEGIN, FEEL, GOING, START, STEPS
 from osimlite.text import listed, or_known
@@ -67,10 +69,12 @@ class Walked:
 
 
 class Scenario:
-    """A scenario that was read.
+    """What walks, by which reflexes, and how it is judged.
 
     Args:
-        path: of its file.
+        given: file of a scenario, SCONE's or YAML; or the same as data of Python, whose files are in the folder that
+            the program runs in.
+        model: that walks, in the place of a `model_file`.
 
     Attributes:
         model: that walks.
@@ -84,10 +88,11 @@ class Scenario:
         DocumentError: it has something that is not done here; its name and line are told.
     """
 
-    def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
-        self.folder = self.path.parent
-        top = read_settings(self.path)
+    def __init__(self, given: str | Path | Mapping[str, Any], model: Model | None = None) -> None:
+        if isinstance(given, Mapping):
+            self.folder, top = Path(), settings_of(given)
+        else:
+            self.folder, top = Path(given).parent, read_settings(given)
         found = next(iter(top.all_of(*OPTIMIZERS)), None)
         self.optimizer = top if found is None else found[1]
         self.population, self.generations, self.seed = POPULATION, GENERATIONS, 0
@@ -101,7 +106,10 @@ class Scenario:
             other = next((name for name, _ in objective.parts if name.startswith("Model")), "no model")
             raise objective.error(f"of models only ModelOpenSim4 is done here, and this has {other}")
         self.settings: Node = settings
-        self.model = read(found_file(settings.text("model_file"), self.folder))
+        if model is None:
+            model = read(found_file(settings.text("model_file"), self.folder))
+        settings.get("model_file")
+        self.model = model
         self.step = settings.number("fixed_control_step_size", 0.005)
         self.begun = self._begun()
         if found is not None:

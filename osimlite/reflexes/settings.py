@@ -1,11 +1,16 @@
-"""Files of SCONE (.scone, .zml): trees of keys and values, with includes and constants."""
+"""Trees of keys and values: files of SCONE (.scone, .zml) with includes and constants, YAML, data of Python.
+
+In YAML and Python a key that stands several times has a list of what stands below it; `include` names another file.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
+from osimlite.document.data import SUFFIXES, parsed_yaml
 from osimlite.errors import DocumentError, MissingFileError
 from osimlite.records import dataclass, field
 from osimlite.text import did_you_mean
@@ -95,10 +100,26 @@ def read_settings(path: str | Path) -> Node:
 
     Raises:
         MissingFileError: a file is not there.
+        MissingDependency: one is YAML and PyYAML is not installed.
         DocumentError: one is damaged; with its line.
     """
     constants: dict[str, str] = {}
     return _read(Path(path), Path(path).parent, constants, 0)
+
+
+def settings_of(data: Mapping[str, Any]) -> Node:
+    """The tree that data of Python describe."""
+    return Node(parts=[part for key, value in data.items() for part in _parts_of(key, value)])
+
+
+def _parts_of(key: str, value: Any) -> Iterator[tuple[str, Node]]:
+    if isinstance(value, Mapping):
+        yield key, settings_of(value)
+    elif isinstance(value, list | tuple) and any(isinstance(item, Mapping) for item in value):
+        for item in value:
+            yield from _parts_of(key, item)
+    else:
+        yield key, Node(" ".join(map(str, value)) if isinstance(value, list | tuple) else str(value))
 
 
 def _read(path: Path, base: Path, constants: dict[str, str], depth: int) -> Node:
@@ -110,6 +131,12 @@ def _read(path: Path, base: Path, constants: dict[str, str], depth: int) -> Node
         raise DocumentError(f"cannot be read: {error}", file=str(path)) from None
     if depth > _MOST_DEEP:
         raise DocumentError("the files include one another without end", file=str(path))
+    if path.suffix in SUFFIXES:
+        top = Node(file=str(path), line=1)
+        found = parsed_yaml(text, str(path), with_lines=True)
+        if found is not None:
+            _fill_from_yaml(top, found, path, base, depth)
+        return top
     tokens = []
     line = 1
     place = 0
@@ -129,6 +156,28 @@ def _read(path: Path, base: Path, constants: dict[str, str], depth: int) -> Node
     if reader.place < len(tokens):
         raise top.error(f"line {tokens[reader.place][1]}: a '}}' without its '{{'")
     return top
+
+
+def _fill_from_yaml(node: Node, found: Any, path: Path, base: Path, depth: int) -> None:
+    """Put below a node what a mapping of YAML has."""
+    if found.id != "mapping":
+        raise node.error("keys with values are wanted")
+    for key, value in found.value:
+        if key.value == "include":
+            node.parts += _read(found_file(value.value, path.parent, base), base, {}, depth + 1).parts
+            continue
+        several = value.value if value.id == "sequence" else [value]
+        if value.id == "sequence" and all(item.id == "scalar" for item in several):
+            words = " ".join(item.value for item in several)
+            node.parts.append((key.value, Node(words, file=node.file, line=value.start_mark.line + 1)))
+            continue
+        for item in several:
+            part = Node(file=node.file, line=item.start_mark.line + 1)
+            node.parts.append((key.value, part))
+            if item.id == "scalar":
+                part.value = item.value
+            else:
+                _fill_from_yaml(part, item, path, base, depth)
 
 
 class _Reader:

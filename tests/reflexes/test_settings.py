@@ -7,7 +7,7 @@ import pytest
 
 from osimlite.errors import OsimliteError
 from osimlite.reflexes.parameters import Parameters, read_par
-from osimlite.reflexes.settings import read_settings
+from osimlite.reflexes.settings import read_settings, settings_of
 
 
 def test_trees_includes_and_constants(tmp_path) -> None:
@@ -25,6 +25,35 @@ def test_trees_includes_and_constants(tmp_path) -> None:
         first.asked.clear()
         first.get("x")
         first.expect_all_asked("a b")
+
+
+def test_yaml_and_data_are_the_same_trees(tmp_path) -> None:
+    yaml = pytest.importorskip("yaml", reason="needs PyYAML (extra 'yaml')")
+    (tmp_path / "other.yaml").write_text("c: 3\n")
+    text = 'a: two words\nb:\n  - {x: "~2<0,20>", y: [1, 2]}\n  - {z: true}\ninclude: other.yaml\n'
+    (tmp_path / "it.yaml").write_text(text)
+    top = read_settings(tmp_path / "it.yaml")
+    assert [(name, node.line) for name, node in top.parts] == [("a", 1), ("b", 3), ("b", 4), ("c", 1)]
+    first, second = (node for _, node in top.all_of("b"))
+    assert first.text("x") == "~2<0,20>" and first.text("y") == "1 2" and second.flag("z", False)
+    data = settings_of({"a": "two words", "b": [{"x": "~2<0,20>", "y": [1, 2]}, {"z": True}], "c": 3})
+
+    def plain(node):
+        return node.value.lower(), [(name, plain(part)) for name, part in node.parts]
+
+    assert plain(data) == plain(top)
+    assert yaml.safe_load(text)["a"] == "two words"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("a: [1", "it.yaml:1:6: not YAML"), ("- 1", "keys with values are wanted"), ("a: [{b: 1}, [2]]", "keys with")],
+)
+def test_damage_of_yaml_is_told(text, words, tmp_path) -> None:
+    pytest.importorskip("yaml", reason="needs PyYAML (extra 'yaml')")
+    (tmp_path / "it.yaml").write_text(text)
+    with pytest.raises(OsimliteError, match=words):
+        read_settings(tmp_path / "it.yaml")
 
 
 @pytest.mark.parametrize(

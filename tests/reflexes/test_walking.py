@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
+import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.models.walking import write_scenario
 from osimlite.reflexes.parameters import Parameters
@@ -106,6 +107,37 @@ def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
     assert set(read_par(tmp_path / "out" / "best.par")) == set(found)
     again = search(Scenario(arm), tmp_path / "out", generations=1, population=8, resume=True)
     assert set(again) == set(found)
+
+
+HOLDS = {
+    "CmaOptimizer": {
+        "SimulationObjective": {
+            "max_duration": 1,
+            "ModelOpenSim4": {"initial_load": 0},
+            "ReflexController": {
+                "dual_sided": 0,
+                "DofReflex": [
+                    {"target": "flexor", "source": "elbow", "P0": 1.2, "KP": "~2<0,20>", "KV": 0.3, "delay": 0.01,
+                     "C0": "~0.1<0,1>"},
+                    {"target": "extensor", "source": "elbow", "P0": 1.2, "KP": -1, "allow_neg_P": 0},
+                ],
+            },
+            "DofMeasure": {"dof": "elbow", "start_time": 0.2, "position": {"min": 65, "max": 72, "abs_penalty": 1}},
+        }
+    }
+}  # fmt: skip
+
+
+def test_yaml_and_data_of_python_say_the_same_as_a_scenario(arm, tmp_path) -> None:
+    yaml = pytest.importorskip("yaml", reason="needs PyYAML (extra 'yaml')")
+    wanted = Scenario(arm).walk({}, duration=0.2)
+    model = osimlite.read(tmp_path / "arm.osim")
+    text = yaml.safe_dump(HOLDS).replace("initial_load: 0", "{initial_load: 0, model_file: arm.osim}")
+    (tmp_path / "arm.yaml").write_text(text)
+    for scenario in (Scenario(HOLDS, model), Scenario(tmp_path / "arm.yaml")):
+        assert [each.name for each in scenario.parameters()] == ["flexor-elbow.KP", "flexor-elbow.C0"]
+        walked = scenario.walk({}, duration=0.2)
+        assert np.array_equal(walked.states.rows, wanted.states.rows)
 
 
 @pytest.mark.parametrize(
