@@ -18,7 +18,7 @@ from osimlite.backends.reader import Function, Kernel, name_of
 from osimlite.simulation.engines.sources import functions_within
 from osimlite.simulation.kernels import pointers
 
-BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
+BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**", ast.BitAnd: "&"}
 COMPARED = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "===", ast.NotEq: "!=="}
 SIGNS = {ast.USub: "-", ast.UAdd: "+", ast.Not: "!"}
 CALLED: dict[Any, str] = {

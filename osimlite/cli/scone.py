@@ -14,7 +14,7 @@ def scone(
         Path,
         Argument(
             metavar="SCENARIO",
-            help="A .scone file, or YAML; 'human-walks' is one of ours, which is written into the folder to be changed.",
+            help="A .scone file, or YAML; 'human-walks' is one of ours, which is written there to be changed.",
             show_default=False,
         ),
     ],

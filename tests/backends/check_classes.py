@@ -10,6 +10,7 @@ import pytest
 
 import osimlite
 from osimlite.backends.constraints import independent_equations
+from osimlite.backends.symbolic import on_symbols
 from osimlite.backends.traced import Traced
 from osimlite.errors import SimulationError, UnsupportedError
 from osimlite.forces import millard2012_equilibrium
@@ -25,9 +26,11 @@ from osimlite.schema.metabolics import (
 from osimlite.schema.path_actuators import ClutchedPathSpring
 from osimlite.schema.probe_types import ActuatorForceProbe, ActuatorPowerProbe, SystemEnergyProbe
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.elements.kind import kinds
+from osimlite.simulation.elements.kind import Kind, kinds
+from osimlite.simulation.engines.sources import functions_within
 from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.simulation.kernels.pack import pack
+from osimlite.simulation.kernels.table import LAW_MODULES, law_function
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
 from tests.backends.jets import carried
@@ -107,6 +110,12 @@ def test_paths_over_obstacles():
     slopes = np.array(f.linear(t, x, both.controls(x), f.p)[1].full())
     found = slope(lambda h: both.derivative(x + h * way), 1e-3)
     assert off(slopes @ way, found, np.abs(slopes) @ np.abs(way)) < 1e-8
+
+
+def test_every_kernel_is_written_for_symbols():
+    names = [*LAW_MODULES, *(kind.name for kind in kinds() if isinstance(kind, Kind))]
+    parts = {part for name in names for part in functions_within(law_function(name))}
+    assert len(parts) > 500 and all(map(on_symbols, parts))
 
 
 def test_probes():
