@@ -78,8 +78,11 @@ LAW_MODULES = {
 }
 """The module of each of the engine's own."""
 
-EQUILIBRIUM, OFF, RESPONSE, RIGID = "_equilibrium", "_off", "_response", "_rigid"
-FORMS = {EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel", RESPONSE: "response_kernel", RIGID: "rigid_kernel"}
+EQUILIBRIUM, OFF, RESPONSE, RIGID, ABREAST = "_equilibrium", "_off", "_response", "_rigid", "_abreast"
+FORMS = {
+    EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel", RESPONSE: "response_kernel", RIGID: "rigid_kernel",
+    ABREAST: "abreast_kernel",
+}  # fmt: skip
 
 LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
 """Index of a law's address among those that begin at `layout.LAWS`."""
