@@ -12,11 +12,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from math import hypot
+from typing import NamedTuple
 
 Point = tuple[float, float, float]
 """x, y, and the slope there."""
 Numbers = tuple[float, ...]
 """Those of a curve."""
+
+
+class Rising(NamedTuple):
+    """Coefficients of a polynomial, from u on."""
+
+    one: float
+    two: float
+    three: float
+    four: float
+    five: float
+
 
 SECTIONS, FIRST, LAST = 0, 1, 4
 HEAD = 7
@@ -104,43 +116,65 @@ def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
     if x > c[LAST]:
         return c[LAST + 1] + c[LAST + 2] * (x - c[LAST]), c[LAST + 2]
     k, u = place_on(c, x)
-    p, q = k + X, k + Y
-    v = u * u
-    run = (c[p] + u * (2.0 * c[p + 1])) + v * ((3.0 * c[p + 2] + u * (4.0 * c[p + 3])) + v * (5.0 * c[p + 4]))
-    rise = (c[q + 1] + u * (2.0 * c[q + 2])) + v * ((3.0 * c[q + 3] + u * (4.0 * c[q + 4])) + v * (5.0 * c[q + 5]))
-    y = (c[q] + u * c[q + 1]) + v * ((c[q + 2] + u * c[q + 3]) + v * (c[q + 4] + u * c[q + 5]))
-    return y, rise / run
+    return on_section(u, _rising(c, k + X), c[k + Y], _rising(c, k + Y + 1))
+
+
+def _rising(c: Sequence[float], k: int) -> Rising:
+    return Rising(c[k], c[k + 1], c[k + 2], c[k + 3], c[k + 4])
 
 
 def place_on(c: Sequence[float], x: float) -> tuple[int, float]:
     """The section of a curve that has x, by the place of its numbers, and u there: the root is unique."""
+    k = section_with(c, x)
+    rest = x - c[k + START]
+    u, of_x = first_place(c, k, rest), _rising(c, k + X)
+    for _ in range(ROUNDS):
+        u, goes_on = nearer_place(u, rest, of_x)
+        if not goes_on:
+            break
+    return k, u
+
+
+def section_with(c: Sequence[float], x: float) -> int:
+    """The section of a curve that has x, by the place of its numbers."""
     count, number = int(c[SECTIONS]), 0
     while number < count - 1 and x >= c[HEAD + number]:
         number += 1
-    k = HEAD + count + SECTION * number
-    rest = x - c[k + START]
+    return HEAD + count + SECTION * number
+
+
+def first_place(c: Sequence[float], k: int, rest: float) -> float:
+    """Where the search begins for the place that is so far in x from the first end of a section."""
     part = rest * c[k + SCALE]
     node = min(int(part), NODES - 1)
     part -= node
     s = k + STARTS + 2 * node
     u0, d0, u1, d1 = c[s], c[s + 1], c[s + 2], c[s + 3]
-    u = u0 + part * (d0 + part * (3.0 * (u1 - u0) - 2.0 * d0 - d1 + part * (2.0 * (u0 - u1) + d0 + d1)))
-    p = k + X
-    a, b, d, e, f = c[p], c[p + 1], c[p + 2], c[p + 3], c[p + 4]
-    for _ in range(ROUNDS):
-        # In halves, which a processor computes side by side.
-        v = u * u
-        off = u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
-        slope = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
-        bend = (b + u * (3.0 * d)) + v * (6.0 * e + u * (10.0 * f))
-        divisor = slope * slope - off * bend
-        if not divisor > 0.0:
-            break
-        step = off * slope / divisor
-        u = min(max(u - step, 0.0), 1.0)
-        if abs(step) < NEAR:
-            break
-    return k, u
+    return u0 + part * (d0 + part * (3.0 * (u1 - u0) - 2.0 * d0 - d1 + part * (2.0 * (u0 - u1) + d0 + d1)))
+
+
+def nearer_place(u: float, rest: float, of_x: Rising) -> tuple[float, bool]:
+    """A step of Halley's search from u, and whether another is wanted; `of_x` are the coefficients of x from u on."""
+    a, b, d, e, f = of_x
+    # In halves, which a processor computes side by side.
+    v = u * u
+    off = u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
+    slope = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
+    bend = (b + u * (3.0 * d)) + v * (6.0 * e + u * (10.0 * f))
+    divisor = slope * slope - off * bend
+    leads_on = divisor > 0.0
+    step = off * slope / (divisor if leads_on else 1.0)
+    return min(max(u - step, 0.0), 1.0) if leads_on else u, leads_on and not abs(step) < NEAR
+
+
+def on_section(u: float, of_x: Rising, y0: float, of_y: Rising) -> tuple[float, float]:
+    """y and the slope at u; the coefficients are those of x and y from u on, after y at the first end."""
+    a, b, d, e, f = of_x
+    g, h, i, j, k = of_y
+    v = u * u
+    run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
+    rise = (g + u * (2.0 * h)) + v * ((3.0 * i + u * (4.0 * j)) + v * (5.0 * k))
+    return (y0 + u * g) + v * ((h + u * i) + v * (j + u * k)), rise / run
 
 
 def curve_integral(c: Sequence[float], x: float) -> float:

@@ -58,6 +58,21 @@ class MillardCurves(NamedTuple):
     tendon: Sequence[float]  # force over tendon length
 
 
+class Fibers(NamedTuple):
+    """What is known of a muscle; before a curve was asked, its argument stands where its value will."""
+
+    left: float  # steps that the search for the velocity may take yet; 0 at its end, -1 if there is none
+    velocity: float
+    by_velocity: float  # factor of the active force
+    active: float  # activation
+    length: float  # of the fibers, m
+    cos: float  # of pennation
+    by_length: float  # active force at rest, fully activated
+    elastic: float  # passive force
+    tendon: float  # its force
+    change: float  # rate of activation, 1/s
+
+
 def millard2012_equilibrium(
     now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
@@ -71,6 +86,28 @@ def millard2012_equilibrium(
         velocity, active and passive fiber force (N), whether a fiber velocity was found, rate of activation (1/s),
         fiber velocity (m/s), what of the passive force is not by damping (N).
     """
+    fibers = fibers_at(now, m)
+    is_found, tendon = fibers.left >= 0.0, 0.0
+    by_length, _ = curve_value(curves.active, fibers.by_length)
+    elastic, _ = curve_value(curves.passive, fibers.by_length)
+    if not m.is_rigid:
+        tendon, _ = curve_value(curves.tendon, fibers.tendon)
+    velocity, by_velocity, by_length, elastic, tendon = fibers_loaded(fibers, m, by_length, elastic, tendon)
+    if m.is_rigid:
+        if fibers.left > 0.0:
+            by_velocity, _ = curve_value(curves.velocity, velocity)
+    elif is_found:
+        if m.damping > 0.0:
+            is_found, velocity, by_velocity = damped_velocity(
+                m, fibers.active, by_length, elastic, tendon, fibers.cos, curves
+            )
+        else:
+            velocity, _ = curve_value(curves.inverse, by_velocity)
+    return muscle_with(fibers, m, is_found, velocity, by_velocity, by_length, elastic, tendon)
+
+
+def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> Fibers:
+    """The fibers at a moment, before any curve was asked."""
     active = min(max(now.excitation if m.is_excited else now.activation, m.least), 1.0)
     fiber = now.fiber_length
     if m.is_rigid:
@@ -78,20 +115,80 @@ def millard2012_equilibrium(
     fiber = max(fiber, m.smallest)
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
     along_tendon = now.length - fiber * cos
-    by_length, _ = curve_value(curves.active, fiber / m.optimal)
-    elastic, _ = curve_value(curves.passive, fiber / m.optimal)
-    is_found, velocity, by_velocity, tendon = cos > SIGNIFICANT, 0.0, 1.0, 0.0
+    left, velocity, tendon = 0.0, 0.0, 0.0
     if m.is_rigid:
         if along_tendon >= m.slack - SIGNIFICANT:
-            velocity = now.rate * cos / (m.optimal * m.fastest)
-            by_velocity, _ = curve_value(curves.velocity, velocity)
-    elif is_found:
-        tendon, _ = curve_value(curves.tendon, along_tendon / m.slack)
-        if m.damping > 0.0:
-            is_found, velocity, by_velocity = damped_velocity(m, active, by_length, elastic, tendon, cos, curves)
-        else:
-            by_velocity = (tendon / cos - elastic) / (active * by_length)
-            velocity, _ = curve_value(curves.inverse, by_velocity)
+            left, velocity = 1.0, now.rate * cos / (m.optimal * m.fastest)
+    else:
+        left, tendon = float(VELOCITY_ROUNDS), along_tendon / m.slack
+    if not cos > SIGNIFICANT:
+        left = -1.0
+    change = first_order_activation_rate(now.excitation, now.activation, m.rising, m.falling, m.least)
+    over = fiber / m.optimal
+    return Fibers(left, velocity, 1.0, active, fiber, cos, over, over, tendon, change)
+
+
+def fibers_loaded(
+    fibers: Fibers, m: Millard2012Equilibrium, by_length: float, elastic: float, tendon: float
+) -> tuple[float, float, float, float, float]:
+    """What these curves say: velocity and factor, for the inverse curve, and `by_length` and the two after it."""
+    velocity, by_velocity = fibers.velocity, 1.0
+    if m.is_rigid or fibers.left < 0.0:
+        tendon = 0.0
+    elif m.damping > 0.0:
+        velocity = velocity_guess(fibers.active, by_length, elastic, tendon, fibers.cos)
+    else:
+        velocity = by_velocity = (tendon / fibers.cos - elastic) / (fibers.active * by_length)
+    return velocity, by_velocity, by_length, elastic, tendon
+
+
+def fibers_guessed(fibers: Fibers, m: Millard2012Equilibrium, inverse: float) -> tuple[float, float]:
+    """Steps that are left, and the velocity to start from; it is that of fibers without damping."""
+    if m.is_rigid or fibers.left < 0.0:
+        return fibers.left, fibers.velocity
+    if m.damping > 0.0:
+        return fibers.left, min(max(inverse, -1.0), 1.0)
+    return 0.0, inverse
+
+
+def fibers_nearer(fibers: Fibers, m: Millard2012Equilibrium, factor: float, slope: float) -> tuple[float, float, float]:
+    """Steps that are left after one, velocity, and factor at the one before."""
+    if m.is_rigid:
+        return 0.0, fibers.velocity, factor
+    is_found, nearer = nearer_velocity(
+        m,
+        fibers.active,
+        fibers.by_length,
+        fibers.elastic,
+        fibers.tendon,
+        fibers.cos,
+        fibers.velocity,
+        factor,
+        slope,
+    )
+    return 0.0 if is_found else -1.0 if fibers.left == 1.0 else fibers.left - 1.0, nearer, factor
+
+
+def muscle_of(
+    fibers: Fibers, m: Millard2012Equilibrium
+) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
+    """What `millard2012_equilibrium` returns, after the search."""
+    of_curves = fibers.by_length, fibers.elastic, fibers.tendon
+    return muscle_with(fibers, m, fibers.left == 0.0, fibers.velocity, fibers.by_velocity, *of_curves)
+
+
+def muscle_with(
+    fibers: Fibers,
+    m: Millard2012Equilibrium,
+    is_found: bool,
+    velocity: float,
+    by_velocity: float,
+    by_length: float,
+    elastic: float,
+    tendon: float,
+) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
+    """The same, with what was found in place of what `fibers` has."""
+    active, fiber, cos = fibers.active, fibers.length, fibers.cos
     pull = m.strength * (active * by_length * by_velocity)
     spring = m.strength * elastic
     passive = spring + m.strength * m.damping * velocity
@@ -102,9 +199,8 @@ def millard2012_equilibrium(
         tension = (pull + passive) * cos
     else:
         tension = tendon * m.strength
-    change = first_order_activation_rate(now.excitation, now.activation, m.rising, m.falling, m.least)
     speed = velocity * m.fastest * m.optimal
-    return tension, active, fiber, cos, by_length, by_velocity, pull, passive, is_found, change, speed, spring
+    return tension, active, fiber, cos, by_length, by_velocity, pull, passive, is_found, fibers.change, speed, spring
 
 
 def millard2012_rigid(now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves) -> float:
@@ -146,18 +242,41 @@ def damped_velocity(
     Returns:
         Whether there is one, the velocity, and the factor of the active force there.
     """
-    tolerance = max(VELOCITY_TOLERANCE * m.strength, 100.0 * SIGNIFICANT)
-    guess = (tendon / max(cos, 0.01) - elastic) / (max(active, 0.01) * max(by_length, 0.01))
-    velocity, _ = curve_value(curves.inverse, guess)
+    velocity, _ = curve_value(curves.inverse, velocity_guess(active, by_length, elastic, tendon, cos))
     velocity, factor = min(max(velocity, -1.0), 1.0), 0.0
     for _ in range(VELOCITY_ROUNDS):
         factor, slope = curve_value(curves.velocity, velocity)
-        passive = m.strength * elastic + m.strength * m.damping * velocity
-        error = (m.strength * (active * by_length * factor) + passive) * cos - tendon * m.strength
-        if abs(error) <= tolerance:
+        is_found, velocity = nearer_velocity(m, active, by_length, elastic, tendon, cos, velocity, factor, slope)
+        if is_found:
             return True, velocity, factor
-        velocity -= error / (m.strength * (active * by_length * slope + m.damping) * cos)
     return False, velocity, factor
+
+
+def velocity_guess(active: float, by_length: float, elastic: float, tendon: float, cos: float) -> float:
+    """At which factor of the active force the search starts; the arguments are those of `damped_velocity`."""
+    return (tendon / max(cos, 0.01) - elastic) / (max(active, 0.01) * max(by_length, 0.01))
+
+
+def nearer_velocity(
+    m: Millard2012Equilibrium,
+    active: float,
+    by_length: float,
+    elastic: float,
+    tendon: float,
+    cos: float,
+    velocity: float,
+    factor: float,
+    slope: float,
+) -> tuple[bool, float]:
+    """A step of Newton's method: whether the velocity is good, and it, or else a better one.
+
+    Args: as of `damped_velocity`; the velocity, and the factor of the active force there with its slope.
+    """
+    passive = m.strength * elastic + m.strength * m.damping * velocity
+    error = (m.strength * (active * by_length * factor) + passive) * cos - tendon * m.strength
+    if abs(error) <= max(VELOCITY_TOLERANCE * m.strength, 100.0 * SIGNIFICANT):
+        return True, velocity
+    return False, velocity - error / (m.strength * (active * by_length * slope + m.damping) * cos)
 
 
 def millard2012_energy(

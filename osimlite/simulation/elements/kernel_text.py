@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import linecache
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from osimlite.records import dataclass
 from osimlite.simulation.kernels import pointers
 from osimlite.simulation.kernels.condensation import WIDTH
-from osimlite.simulation.kernels.layout import ITEM, MODEL, OUTCOME, WORK
-from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF, RESPONSE, RIGID
+from osimlite.simulation.kernels.curves_abreast import LANES, ask, curves_at, slope_of, value_of
+from osimlite.simulation.kernels.layout import ITEM, MODEL, OUTCOME, RUN, WORK
+from osimlite.simulation.kernels.table import ABREAST, EQUILIBRIUM, OFF, RESPONSE, RIGID
 
 if TYPE_CHECKING:
     from osimlite.simulation.elements.kind import Kind, State
@@ -20,11 +21,33 @@ if TYPE_CHECKING:
 SOLVED = "solved"
 """The output that tells whether the law has a solution; without it, it always has one."""
 
-RECORDS = {record.__name__: record for record in (MODEL, ITEM, WORK, OUTCOME)}
+RECORDS = {record.__name__: record for record in (MODEL, ITEM, RUN, WORK, OUTCOME)}
 """What the code of kernels uses of the layout."""
 
 SMALL_CHANGE = 1e-7
 """Of lengths (m), angles, speeds and states, to find derivatives."""
+
+
+class Asked(NamedTuple):
+    """A part of a law that follows when curves were asked."""
+
+    curves: dict[str, str]  # names of the curves, each with the name of what is known that is its argument
+    law: Callable[..., Any]  # given what is known, the first parameter, and the value of each curve
+    results: tuple[str, ...]  # names of what it finds
+    slopes: bool = False  # whether it is given the slope after each value
+
+
+class Abreast(NamedTuple):
+    """A law in parts, for several forces: their curves are asked together, which a processor does side by side.
+
+    The results are those of the law to the last bit.
+    """
+
+    known: type[Any]  # named tuple of what the parts find; while the first is positive, the search goes on
+    begin: Callable[..., Any]  # makes it, from what the law is given of the moment, and the first parameter
+    parts: tuple[Asked, ...]
+    search: Asked  # a step of it
+    end: Callable[..., Any]  # the results of the law, from what is known and the first parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +110,79 @@ class KernelText:
                 lines.append(f"change[{WIDTH * row + column}] = {difference}")
         return self._function(RESPONSE, kind.law, lines)
 
+    @cached_property
+    def abreast_kernel(self) -> Callable[..., int]:
+        """The function that computes and applies several forces that follow one another."""
+        kind, made = self.kind, self.kind.abreast
+        if made is None:
+            raise TypeError(f"the law of {kind.name} has no parts")
+        inputs, recorded, arguments = kind.geometry.inputs, kind.recorded, self._arguments
+        # Up to the end the record has what is known.
+        own = (f"found[{place}]" for name, place in recorded.items() if name not in inputs)
+        known = dict(zip(made.known._fields, own, strict=False))
+        of_moment = len(self._inputs) + 1 + sum(state.given for state in kind.states)
+        told = f"known({', '.join(known.values())}), {arguments[of_moment]}"
+        begin = f"{', '.join(known.values())} = {self._call(arguments[: of_moment + 1], 'begin')}"
+        going = f"if {known[made.known._fields[0]]} > 0.0:"
+        *_, last = asks = [self._asking(part, known) for part in (*made.parts, made.search)]
+        last[:] = [going, *(f"    {line}" for line in last)]
+        lines = ["asked = 0", *self._each([*kind.geometry.before, *self._noted(inputs), begin, *asks[0]])]
+        # Whoever has an answer asks for the next at once.
+        answer = ["curves_at(x, lanes, asked)", "asked = answered = 0"]
+        for number, part in enumerate(made.parts):
+            lines += [*answer, *self._each([*self._answering(part, f"law_{number}", known, told), *asks[number + 1]])]
+        step = self._answering(made.search, "search", known, told)
+        step = [*answer, *self._each([going, *(f"    {line}" for line in (*step, *last))])]
+        lines += ["while asked > 0:", *(f"    {line}" for line in step)]
+        end = [f"{', '.join(kind.outputs)} = end({told})"]
+        end += self._results(name for name in recorded if name not in inputs)
+        lines += self._each([*end, *kind.geometry.after])
+        most = LANES // max(len(part.curves) for part in (*made.parts, made.search))
+        scope = {f"law_{number}": part.law for number, part in enumerate(made.parts)}
+        return self._written(
+            ABREAST,
+            "run",
+            [
+                "lanes, first = at(w, s[run + RUN.ROOM]), s[run + RUN.FIRST]",
+                "while first < s[run + RUN.END]:",
+                f"    end_of_part = min(first + {most}, s[run + RUN.END])",
+                *(f"    {line}" for line in lines),
+                "    first = end_of_part",
+            ],
+            **scope,
+            **{"known": made.known, "begin": made.begin, "search": made.search.law, "end": made.end},
+            **{"ask": ask, "value_of": value_of, "slope_of": slope_of, "curves_at": curves_at},
+        )
+
+    def _asking(self, part: Asked, known: Mapping[str, str]) -> list[str]:
+        """Ask for the curves of a part."""
+        *_, curves = self.kind.terms
+        places, number = {}, self.size - curves.size
+        for name, term in zip(curves.type._fields, curves.terms, strict=True):  # type: ignore[attr-defined]
+            places[name], number = number, number + term.size
+        asks = enumerate(part.curves.items())
+        return [
+            *(f"ask(lanes, asked + {k}, i[ITEM.NUMBERS] + {places[curve]}, {known[at]})" for k, (curve, at) in asks),
+            f"asked += {len(part.curves)}",
+        ]
+
+    def _answering(self, part: Asked, law: str, known: Mapping[str, str], told: str) -> list[str]:
+        """Have the law of a part answer."""
+        kinds, count = ("value_of", "slope_of")[: 1 + part.slopes], len(part.curves)
+        answers = ", ".join(f"{kind}(lanes, answered + {k})" for k in range(count) for kind in kinds)
+        results = ", ".join(known[name] for name in part.results)
+        return [f"{results} = {law}({told}, {answers})", f"answered += {count}"]
+
+    def _each(self, lines: Sequence[str]) -> list[str]:
+        """Lines about each item of a run; who is told of an item without a solution is told its number."""
+        refused = "    return OUTCOME.UNSOLVED"
+        told = [new for line in lines for new in (("    f[0] = number", line) if line == refused else (line,))]
+        return [
+            "for number in range(first, end_of_part):",
+            "    item = s[s[MODEL.ITEM_AT] + number]",
+            *(f"    {line}" for line in (*self._places_of_item, *told)),
+        ]
+
     @property
     def _changed(self) -> dict[int, int]:
         """By column of the derivatives the place of the argument that is changed."""
@@ -104,15 +200,22 @@ class KernelText:
         return kind.law is not None and kind.geometry.along[0] in kind.outputs and bool(self._changed)
 
     def _function(self, form: str, law: Callable[..., Any] | None, lines: Sequence[str]) -> Callable[..., int]:
+        return self._written(form, "item", [*self._places_of_item, *self.kind.geometry.before, *lines], law=law)
+
+    @property
+    def _places_of_item(self) -> list[str]:
+        recorded = len(self.kind.recorded)
+        return [
+            "i = at(s, item)",
+            "p, found = at(x, i[ITEM.NUMBERS]), at(w, i[ITEM.RECORD])",
+            f"g, gp, room = at(i, {ITEM.OWN + self.heads}), at(p, {self.size}), at(found, {recorded})",
+        ]
+
+    def _written(self, form: str, place: str, lines: Sequence[str], **own: Any) -> Callable[..., int]:
         kind, name = self.kind, self.kind.name + form
-        recorded = len(kind.recorded)
         source = "\n    ".join(
             [
-                f'def {name}(s: "Ints", x: "Floats", w: "Floats", y: "Floats", f: "Floats", item: "int") -> "int":',
-                "i = at(s, item)",
-                "p, found = at(x, i[ITEM.NUMBERS]), at(w, i[ITEM.RECORD])",
-                f"g, gp, room = at(i, {ITEM.OWN + self.heads}), at(p, {self.size}), at(found, {recorded})",
-                *kind.geometry.before,
+                f'def {name}(s: "Ints", x: "Floats", w: "Floats", y: "Floats", f: "Floats", {place}: "int") -> "int":',
                 *lines,
                 "return OUTCOME.OK\n",
             ]
@@ -120,7 +223,7 @@ class KernelText:
         scope = {name: value for term in kind.terms for name, value in term.functions().items()}
         if kind.together is not None:
             scope[kind.together.__name__] = kind.together
-        return written(name, f"{__package__}.kinds.{kind.name}", source, law=law, **kind.geometry.functions(), **scope)
+        return written(name, f"{__package__}.kinds.{kind.name}", source, **own, **kind.geometry.functions(), **scope)
 
     @property
     def _computing(self) -> list[str]:
@@ -129,7 +232,11 @@ class KernelText:
         if kind.law is not None:
             results = f"{', '.join(kind.outputs)} = " if kind.outputs else ""
             lines.append(f"{results}{self._call(self._arguments)}")
-        lines += self._noted(kind.recorded)
+        return lines + self._results(kind.recorded)
+
+    def _results(self, names: Iterable[str]) -> list[str]:
+        """Note results of the law by their names, and what it says of states."""
+        kind, lines = self.kind, self._noted(names)
         if SOLVED in kind.outputs:
             lines += [f"if not {SOLVED}:", "    return OUTCOME.UNSOLVED"]
         for place, state in self._places.items():
@@ -160,15 +267,15 @@ class KernelText:
     def _inputs(self) -> tuple[str, ...]:
         return self.kind.geometry.inputs if self.kind.inputs is None else self.kind.inputs
 
-    def _call(self, arguments: Sequence[str]) -> str:
+    def _call(self, arguments: Sequence[str], law: str = "law") -> str:
         """The law called with these; as one, those that change with time, if the kind says so."""
         made = self.kind.together
         if made is None:
-            return f"law({', '.join(arguments)})"
+            return f"{law}({', '.join(arguments)})"
         names = *self._inputs, "excitation", *(state.name for state in self.kind.states if state.given)
         given = dict(zip(names, arguments, strict=False))
         first = f"{made.__name__}({', '.join(given.get(name, '0.0') for name in made._fields)})"
-        return f"law({', '.join((first, *arguments[len(names) :]))})"
+        return f"{law}({', '.join((first, *arguments[len(names) :]))})"
 
     @property
     def heads(self) -> int:

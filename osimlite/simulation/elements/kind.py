@@ -27,10 +27,10 @@ from osimlite.schema.tree import is_a
 from osimlite.simulation.elements.gather import ElementBuilder, module_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places, Response, Silent
-from osimlite.simulation.elements.kernel_text import SOLVED, KernelText
+from osimlite.simulation.elements.kernel_text import SOLVED, Abreast, KernelText
 from osimlite.simulation.elements.parameters import Control, Fields, Number, Parameter, ReflexControl, Tail
 from osimlite.simulation.kernels.layout import ITEM
-from osimlite.simulation.kernels.table import EQUILIBRIUM, OFF, RESPONSE, RIGID
+from osimlite.simulation.kernels.table import ABREAST, EQUILIBRIUM, OFF, RESPONSE, RIGID
 from osimlite.simulation.states import StateVariable
 
 ENERGY = "energy"
@@ -83,6 +83,7 @@ class Kind:
     settled: tuple[str, ...] = ()  # names of the states that it finds
     # force (N) of fully active fibers along a rigid tendon, from what the law is given; of muscles
     rigid: Callable[..., float] | None = None
+    abreast: Abreast | None = None  # the law in parts, which several forces take together
     # what is said of a force whose law, or equilibrium, has no solution, from what is `known` of it
     told: Callable[[Mapping[str, float]], str] | None = None
     # of the record, in which {name} stands for that of the force, each with its output; the geometry's own if None
@@ -187,6 +188,7 @@ class Kind:
             room=tail.room,
             states=at_states,
             equilibrium=self.name + EQUILIBRIUM if there & set(self.settled) and not force.form else "",
+            abreast=self.name + ABREAST if self.abreast is not None and not force.form else "",
             response=Response(self.name + RESPONSE, len(heads), len(self.states), sense) if responds else None,
         )
         return [*parts, item]

@@ -188,8 +188,9 @@ class Program:
     def __init__(self, packed: Packed, code: Code, entries: Sequence[str] = ()) -> None:
         self.ints: Ints = packed.structure.copy()
         kernels = [kernel for kernel in packed.kernels.values() if isinstance(kernel, str)]
-        functions = tuple(dict.fromkeys((*entries, *packed.laws, *kernels)))
+        functions = tuple(dict.fromkeys((*entries, *packed.laws, *kernels, *packed.runs.values())))
         self.code = code = code.chosen_for(functions)
+        runs = packed.runs if code is COMPILED else {}
         self._equilibria, self._responses = packed.equilibria, packed.responses
         self.failures: list[Exception] = []
         self._kept: list[Any] = []
@@ -197,7 +198,7 @@ class Program:
         for name in packed.laws:
             self.ints[MODEL.LAWS + LAW_NUMBERS[name]] = code.address(name)
         self._count = len(packed.numbers)
-        for place, kernel in packed.kernels.items():
+        for place, kernel in [*packed.kernels.items(), *runs.items()]:
             self._link(place, kernel)
 
     def drive(self, structure: Ints, kernel: str | Callable[..., None]) -> None:

@@ -21,6 +21,7 @@ from osimlite.simulation.kernels.layout import (
     LINK_WORK,
     MODEL,
     OUTCOME,
+    RUN,
     STAGE,
 )
 from osimlite.simulation.kernels.motion import move, place
@@ -190,12 +191,19 @@ def apply_forces(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
     for number in range(s[MODEL.CONTACTS]):
         result = at(w, s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * number)
         result[0], result[1], result[2], result[CONTACT_WORK.DEPTH] = 0.0, 0.0, 0.0, 0.0
-    for number in range(s[MODEL.ITEMS]):
-        item = s[s[MODEL.ITEM_AT] + number]
-        status = call(s[item + ITEM.LAW], s, x, w, y, f, item)
-        if status != OUTCOME.OK:
-            f[0] = number
-            return status
+    for number in range(s[MODEL.RUNS]):
+        run = s[MODEL.RUN_AT] + RUN.SIZE * number
+        if s[run + RUN.LAW] != 0:
+            status = call(s[run + RUN.LAW], s, x, w, y, f, run)
+            if status != OUTCOME.OK:
+                return status
+            continue
+        for k in range(s[run + RUN.FIRST], s[run + RUN.END]):
+            item = s[s[MODEL.ITEM_AT] + k]
+            status = call(s[item + ITEM.LAW], s, x, w, y, f, item)
+            if status != OUTCOME.OK:
+                f[0] = k
+                return status
     return OUTCOME.OK
 
 

@@ -57,7 +57,9 @@ class MODEL(metaclass=Record):
     """Count and offset of the forces that push along one displacement: for each the address of the kernel that finds
     their derivatives, the offset of its item, the offset among the item's integers of the first of those that say where
     its states are, their count, and -1 if it pulls against the displacement, else 1."""
-    LAWS = 28
+    RUNS, RUN_AT = 28, 29
+    """Count and offset of runs of items that follow one another, see `RUN`."""
+    LAWS = 30
     """From here on the addresses of the laws, by their number."""
 
 
@@ -97,6 +99,13 @@ class ITEM(metaclass=Record):
     element, and from OWN on integers of its own. The record of the controls is like one."""
 
     LAW, NUMBERS, RECORD, FIRST_CONTACT, OWN = range(5)
+
+
+class RUN(metaclass=Record):
+    """Of items that are computed one after another: address of the kernel that computes all of them at once, 0 if each
+    is computed by its own; numbers of the first and the end; offset in w of room for curves, see `curves_abreast`."""
+
+    LAW, FIRST, END, ROOM, SIZE = range(5)
 
 
 class CONSTRAINED(metaclass=Record):

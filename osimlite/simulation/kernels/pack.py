@@ -18,6 +18,7 @@ from osimlite.records import dataclass, field
 from osimlite.simulation.constrained import constraints_on, free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.items import CONTROLS, ForceElement, Placement, Places, Response
+from osimlite.simulation.kernels.curves_abreast import LANES, ROWS
 from osimlite.simulation.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM, function_table
 from osimlite.simulation.kernels.layout import (
     CONSTRAINED,
@@ -46,6 +47,8 @@ LAWS_OF_FUNCTIONS = {
     ARC: "amount_by_arc",
 }
 """The law of each kind of function that takes several coordinates."""
+FEWEST = 8
+"""Items that follow one another and are worth a kernel of their own."""
 
 
 @dataclass
@@ -59,6 +62,7 @@ class Packed:
     kernels: dict[int, str | Callable[..., None]]
     equilibria: dict[int, str]  # by place in the structure the name of what brings an item into equilibrium
     responses: dict[int, str]  # by place in the structure the name of what finds the derivatives of an item
+    runs: dict[int, str]  # by place in the structure the name of what computes several items at once
     owners: dict[int, int]  # by place in the structure of an item the number of its force element
     order: tuple[int, ...]  # place in the mechanism of the coordinate of each degree of freedom
     placements: list[Placement]  # of every body its link (-1 for ground) and its frame in that
@@ -236,6 +240,7 @@ class Packer:
         self.equilibria: dict[int, str] = {}
         self.responses: dict[int, str] = {}
         self.owners: dict[int, int] = {}
+        self.runs: dict[int, str] = {}
 
     def packed(self, order: tuple[int, ...]) -> Packed:
         """Everything."""
@@ -266,7 +271,7 @@ class Packer:
         ints[MODEL.WORK_SIZE] = self.work
         structure, numbers = np.array(ints, dtype=np.int64), np.array(self.numbers, dtype=np.float64)
         laws = tuple(dict.fromkeys(self.laws))
-        asked = self.kernels, self.equilibria, self.responses, self.owners
+        asked = self.kernels, self.equilibria, self.responses, self.runs, self.owners
         return Packed(structure, numbers, laws, *asked, order, self.places.placements, result)
 
     def room(self, count: int) -> int:
@@ -394,6 +399,7 @@ class Packer:
         pairs: list[int] = []
         settling: dict[int, str] = {}
         responding: dict[int, Response] = {}
+        runs: list[tuple[str, int]] = []
         result: list[list[tuple[int, int]]] = []
         places = {CONTROLS: self.ints[MODEL.WORK_CONTROL]}
         for owner, (element, group) in enumerate(zip(self.elements, groups, strict=True)):
@@ -405,6 +411,8 @@ class Packer:
                 if item.is_contact:
                     pairs.append(len(self.ints))
                 if not item.is_part:
+                    if not runs or runs[-1][0] != item.abreast:
+                        runs.append((item.abreast, len(records)))
                     records.append(len(self.ints))
                 self.kernels[len(self.ints)] = item.kernel if item.python is None else item.python
                 self.owners[len(self.ints)] = owner
@@ -432,6 +440,12 @@ class Packer:
         for place, response in responding.items():
             self.responses[len(self.ints)] = response.kernel
             self.ints += [0, place, ITEM.OWN + response.first_state, response.states, response.sense]
+        room = self.room(LANES * ROWS) if any(kernel for kernel, _ in runs) else 0
+        self.ints[MODEL.RUNS], self.ints[MODEL.RUN_AT] = len(runs), len(self.ints)
+        for (kernel, first), end in zip(runs, [*(run[1] for run in runs[1:]), len(records)], strict=False):
+            if end - first >= FEWEST and kernel:
+                self.runs[len(self.ints)] = kernel
+            self.ints += [0, first, end, room]
         return result
 
     def control_record(self) -> None:

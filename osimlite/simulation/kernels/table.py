@@ -17,6 +17,7 @@ LAW_MODULES = {
     "evaluate": "dynamics",
     "equilibrate": "dynamics",
     "run_several": "runs",
+    "hold_several": "walks",
     "walk_several": "walks",
     "merson": "merson",
     "euler2": "euler2",
@@ -78,8 +79,11 @@ LAW_MODULES = {
 }
 """The module of each of the engine's own."""
 
-EQUILIBRIUM, OFF, RESPONSE, RIGID = "_equilibrium", "_off", "_response", "_rigid"
-FORMS = {EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel", RESPONSE: "response_kernel", RIGID: "rigid_kernel"}
+EQUILIBRIUM, OFF, RESPONSE, RIGID, ABREAST = "_equilibrium", "_off", "_response", "_rigid", "_abreast"
+FORMS = {
+    EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel", RESPONSE: "response_kernel", RIGID: "rigid_kernel",
+    ABREAST: "abreast_kernel",
+}  # fmt: skip
 
 LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
 """Index of a law's address among those that begin at `layout.LAWS`."""

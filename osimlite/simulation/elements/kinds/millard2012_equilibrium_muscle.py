@@ -5,12 +5,18 @@ from functools import partial
 from typing import Any
 
 from osimlite.forces.millard2012_equilibrium import (
+    Fibers,
     Millard2012Equilibrium,
     MillardCurves,
+    fibers_at,
+    fibers_guessed,
+    fibers_loaded,
+    fibers_nearer,
     millard2012_energy,
     millard2012_equilibrium,
     millard2012_equilibrium_length,
     millard2012_rigid,
+    muscle_of,
 )
 from osimlite.forces.muscle_curves import (
     ACTIVE_SIZE,
@@ -26,6 +32,7 @@ from osimlite.forces.muscles import SIGNIFICANT, pennation
 from osimlite.schema.muscle_parts import MuscleFirstOrderActivationDynamicModel
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
 from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.kernel_text import Abreast, Asked
 from osimlite.simulation.elements.kind import DeclaredForce, State
 from osimlite.simulation.elements.muscle import SPRING, curve, muscle, require
 from osimlite.simulation.elements.parameters import Fields, Number, Together, positive
@@ -135,6 +142,20 @@ KIND = muscle(
     equilibrium=millard2012_equilibrium_length,
     settled=("fiber_length",),
     rigid=millard2012_rigid,
+    abreast=Abreast(
+        Fibers,
+        fibers_at,
+        (
+            Asked(
+                {"active": "by_length", "passive": "by_length", "tendon": "tendon"},
+                fibers_loaded,
+                ("velocity", "by_velocity", "by_length", "elastic", "tendon"),
+            ),
+            Asked({"inverse": "velocity"}, fibers_guessed, ("left", "velocity")),
+        ),
+        Asked({"velocity": "velocity"}, fibers_nearer, ("left", "velocity", "by_velocity"), slopes=True),
+        muscle_of,
+    ),
     stored=_energy,
     check=_check,
 )

@@ -1,0 +1,72 @@
+"""Muscles whose curves are asked together, beside each by itself: the same to the last bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+
+from osimlite.errors import SimulationError
+from osimlite.models.jumper import jumper
+from osimlite.schema.muscles import Millard2012EquilibriumMuscle
+from osimlite.simulation.kernels.layout import MODEL, RUN
+from osimlite.simulation.run import Simulation
+
+
+def changed(model):
+    """With muscles of all sorts beside one another, some of which answer to their stretch."""
+    for number, muscle in enumerate(model.components(Millard2012EquilibriumMuscle)):
+        muscle.fiber_damping = (0.1, 0.0, 0.05, 0.1, 0.0)[number % 5]
+        muscle.ignore_tendon_compliance = number % 5 in (3, 4)
+        muscle.ignore_activation_dynamics = number % 7 == 2
+        muscle.tendon_force_length_curve.strain_at_one_norm_force = 0.03 + 0.002 * number
+    return model
+
+
+def alone(engine):
+    """The same engine, in which every item is computed by itself."""
+    ints = engine.program.ints
+    runs = range(ints[MODEL.RUN_AT], ints[MODEL.RUN_AT] + RUN.SIZE * ints[MODEL.RUNS], RUN.SIZE)
+    assert any(ints[run + RUN.LAW] for run in runs)
+    for run in runs:
+        ints[run + RUN.LAW] = 0
+    return engine
+
+
+@pytest.mark.parametrize("change", [lambda model: model, changed], ids=["as they are", "of all sorts"])
+def test_muscles_abreast_are_those_by_themselves(change) -> None:
+    together = Simulation(change(jumper(driven=False)), "compiled").engine
+    single = alone(Simulation(change(jumper(driven=False)), "compiled").engine)
+    start = np.array(together.equilibrated(0.0, together.state.default()))
+    rng, size = np.random.default_rng(0), len(together.order)
+    found = 0
+    for _ in range(200):
+        y = start + np.concatenate(
+            [0.4 * rng.normal(size=size), 3.0 * rng.normal(size=size), np.zeros(len(start) - 2 * size)]
+        )
+        y[2 * size :] *= rng.uniform(0.5, 1.6, len(start) - 2 * size)
+        try:
+            expected = single.derivative(0.0, y.tolist())
+        except SimulationError as error:
+            with pytest.raises(type(error)):
+                together.derivative(0.0, y.tolist())
+            continue
+        found += 1
+        assert np.array_equal(expected, together.derivative(0.0, y.tolist()))
+        assert together.force_records(0.0, y.tolist()) == single.force_records(0.0, y.tolist())
+    assert found > 100
+
+
+def test_a_muscle_without_a_solution_is_told_by_its_name() -> None:
+    engines = [Simulation(jumper(driven=False), "compiled").engine for _ in range(2)]
+    alone(engines[1])
+    y = engines[0].equilibrated(0.0, engines[0].state.default())
+    place = 2 * len(engines[0].order) + engines[0].state.paths.index("/forceset/vasti_l/fiber_length")
+    y[place] = float("nan")
+    told = []
+    for engine in engines:
+        with pytest.raises(SimulationError) as error:
+            engine.derivative(0.0, y)
+        told.append(str(error.value))
+    assert told[0] == told[1]
