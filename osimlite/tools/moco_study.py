@@ -25,7 +25,7 @@ def run(job: Job, outcome: Outcome) -> None:
 
     study = job.setup
     tell = telling(outcome) if study.solver.verbosity > 0 else None
-    solution = solved(Program(Problem(study, job.file)), None, tell)
+    solution = solved(Program(Problem(study, job.file)), None, tell, job.refine)
     name = study.name or "MocoStudy"
     outcome.new_table(job.in_results(f"{name}_solution.sto"), solution.trajectory.table())
     if solution.stride is not None:
@@ -48,8 +48,11 @@ def report(solution: MocoSolution, outcome: Outcome) -> None:
         "iterations": solution.iterations,
         "status": solution.status,
         "duration": solution.duration,
+        "rounds": [each._asdict() for each in solution.rounds],
     }
     outcome.tell("status", f"{solution.status} after {solution.iterations} iterations in {solution.duration:.3g} s")
+    for each in solution.rounds:
+        outcome.tell("mesh", str(each))
     for goal, value in solution.terms.items():
         outcome.tell(goal, f"{value:.8g}")
     outcome.tell("objective", f"{solution.objective:.8g}")

@@ -15,7 +15,7 @@ def run(job: Job, outcome: Outcome) -> None:
     from osimlite.optimal.track import problem_of_track
 
     problem, guess = problem_of_track(job.setup, job.file)
-    solution = solved(Program(problem), guess, telling(outcome))
+    solution = solved(Program(problem), guess, telling(outcome), job.refine)
     name = job.setup.name or "MocoTrack"
     for goal, what in (("state_tracking", "states"), ("marker_tracking", "markers")):
         if goal in problem.tables:
