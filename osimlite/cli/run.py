@@ -59,6 +59,8 @@ def run(
     Of several setups each waits for those that make what it names; one that fails stops no other. What is done is noted
     until all are, and --resume goes on after Ctrl-C, a crash or an error. With -o each has a folder of its own in it.
 
+    With --report what a study of Moco finds is simulated, too, and it is told how far the motion stays with it.
+
     Exits with 0 if all is done, 1 if the answer of a tool is no, 2 if a setup could not be run.
 
     Example: osimlite run scale.xml 'trials/*/ik.xml' 'trials/*/id.xml' --workers 4
@@ -78,7 +80,7 @@ def run(
             raise SettingError(f"--report would replace '{report}', which the results come from; give it another name")
         workers = 1
     if len(files) == 1 and not as_json and not (resume or cluster):
-        outcome = _run_alone(files[0], output, refine)
+        outcome = _run_alone(files[0], output, refine, simulates=report is not None)
         _write_report({files[0]: outcome}, report)
         raise SystemExit(0 if outcome.done else 1)
     if refine is not None:
@@ -114,7 +116,7 @@ def _codes(trials: list[Trial]) -> list[int]:
     return [{DONE: 0, NO: 1}.get(trial.status, 2) for trial in trials]
 
 
-def _run_alone(setup: Path, output: Path | None, refine: str | None) -> Outcome:
+def _run_alone(setup: Path, output: Path | None, refine: str | None, *, simulates: bool) -> Outcome:
     """Run a setup, and say what came out."""
     from osimlite.cli._console import say
     from osimlite.lint.diagnostic import Report
@@ -123,7 +125,12 @@ def _run_alone(setup: Path, output: Path | None, refine: str | None) -> Outcome:
 
     try:
         outcome = run_setup(
-            setup, output, tell=_show_findings, progress=lambda line: say(line, err=True), refine=refine
+            setup,
+            output,
+            tell=_show_findings,
+            progress=lambda line: say(line, err=True),
+            refine=refine,
+            simulates=simulates,
         )
     except FaultySetup as fault:
         _show_findings(Report(fault.report.errors, fault.report.texts))

@@ -21,4 +21,4 @@ def run(job: Job, outcome: Outcome) -> None:
         if goal in problem.tables:
             outcome.new_table(job.result(f"{name}_tracked_{what}.sto"), problem.tables[goal])
     outcome.new_table(job.result(f"{name}_solution.sto"), solution.trajectory.table())
-    report(solution, outcome)
+    report(job, problem, solution, outcome)

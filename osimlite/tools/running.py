@@ -54,6 +54,7 @@ def run(
     tell: Callable[[Report], None] | None = None,
     progress: Callable[[str], None] | None = None,
     refine: float | str | None = None,
+    simulates: bool = False,
 ) -> Outcome:
     """Run the setup of a tool as OpenSim would, and write the files that it would write.
 
@@ -66,6 +67,8 @@ def run(
         progress: is told, line by line, how far a long search has come.
         refine: of optimal control, split intervals of the mesh until the error of none is above this; see
             :func:`osimlite.moco.solve`.
+        simulates: of optimal control, whether the model is also simulated with the controls that were found, and it is
+            told how far that is from what was found.
 
     Returns:
         The tables that were written, as they were before they were rounded to the digits of the files, and a summary.
@@ -98,7 +101,7 @@ def run(
             tell(Report(misspelt, report.texts))
     tool = import_module(f"{__package__}.{module_name(tag)}")
     try:
-        tool.run(Job(top, file, None if output is None else Path(output), refine), outcome)
+        tool.run(Job(top, file, None if output is None else Path(output), refine, simulates), outcome)
         outcome.write(file)
     except OsimliteError as error:
         error.file = error.file or str(file)
