@@ -126,7 +126,7 @@ def walking_study(model: Model, file: str, guess: str) -> MocoStudy:
         name="solver",
         num_mesh_intervals=25,
         optim_max_iterations=1000,
-        optim_convergence_tolerance=1e-3,
+        optim_convergence_tolerance=1e-4,
         optim_constraint_tolerance=1e-4,
         guess_file=guess,
     )

@@ -58,9 +58,15 @@ class PointFunction:
         jacobian = casadi.jacobian(column, both)
         self.jacobian_rows, self.jacobian_columns = map(np.array, jacobian.sparsity().get_triplet())
         options, count = {"cse": True}, len(numbers)
-        self.value = casadi.Function("F", given, [column], options).map(count)
+        self._formula = casadi.Function("F", given, [column], options)
+        self.value = self._formula.map(count)
         self.slope = casadi.Function("J", given, [casadi.vertcat(*jacobian.nonzeros())], options).map(count)
         self._hessian_parts: Any = [*given, multipliers], casadi.dot(multipliers, column), both, count
+
+    def at(self, program: Program, w: Array, places: Array, z: Array) -> Array:
+        """F (n, rows) at other places (n,), from 0 to 1, with these variables (n, ...)."""
+        given = program._given_at(w, places, z)
+        return np.array(self._formula.map(len(places))(*given)).T
 
     def make_hessian(self) -> None:
         """The second derivatives are only made if they are asked for."""
@@ -307,10 +313,13 @@ class Program:
         return self._found[key]
 
     def _given(self, sort: PointFunction, w: Array) -> list[Array]:
-        places = self.problem.grid.places[sort.numbers]
+        return self._given_at(w, self.problem.grid.places[sort.numbers], w[sort.columns])
+
+    def _given_at(self, w: Array, places: Array, z: Array) -> list[Array]:
+        """What the function of a point is given at places (n,) with variables z (n, ...)."""
         s = w[: self.layout.shared]
         times = w[0] + places * (w[1] - w[0])
-        return [np.repeat(s[:, None], len(places), 1), w[sort.columns].T, places[None], self._known(times)]
+        return [np.repeat(s[:, None], len(places), 1), z.T, places[None], self._known(times)]
 
     def _all(self, name: str, w: Array) -> Array:
         parts = [np.array(getattr(sort, name)(*self._given(sort, w))).T.ravel() for sort in self.sorts]

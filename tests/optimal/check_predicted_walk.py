@@ -10,8 +10,14 @@ import pytest
 
 import osimlite
 from osimlite.cli import main
+from osimlite.optimal.simulated import simulated
+from osimlite.records import replace
+from osimlite.tools import moco_study
+from osimlite.tools.job import Job
+from osimlite.tools.outcome import Outcome
 from osimlite.view.motion import contact_forces
 from osimlite.view.recording import read_recording
+from osimlite.view.report import _contacts, _controls, _trials
 
 WEIGHT = 75.0 * 9.80665
 
@@ -88,3 +94,45 @@ def test_standard_output_gets_the_model_alone(tmp_path, monkeypatch, capfd):
         main(["build", "human-walks", "-o", "-"])
     assert '<Model name="human-walks">' in capfd.readouterr().out
     assert not [*Path().iterdir()]
+
+
+def test_a_report_shows_what_was_found(walk):
+    """Goals, controls, the ground's forces, and how far a simulation stays with it."""
+    folder, found = walk
+    file = folder / "human-walks.omoco"
+    outcome, problem = Outcome(), osimlite.moco.problem_of(file)
+    moco_study.report(Job(problem.study, file, simulates=True), problem, found, outcome)
+    told = dict(outcome.told)
+    assert {"effort", "roughness", "objective"} <= {*told}
+    near = re.fullmatch(
+        r"within 0\.01 rad or m of it up to (\S+) s of (\S+) s, (\S+) off at the end \(\w+\)", told["simulated"]
+    )
+    assert near is not None
+    # On so coarse a mesh for a while.
+    assert 0.1 < float(near[1]) <= float(near[2]) == pytest.approx(found.states.times[-1], rel=1e-3)
+    page = osimlite.report({file: outcome}, folder / "page.html").read_text(encoding="utf-8")
+    assert [title for title in re.findall("<h2>(.+?)</h2>", page) if title != "Joint angles"] == [
+        "Controls",
+        "Contact forces",
+    ]
+    (frame,) = re.findall('srcdoc="(.+?)"', page, re.S)
+    assert "foot_r_heel_r" in frame and "soleus_r" in frame
+    (trial,) = _trials({file: outcome})
+    up = {line.side: line.column for line in _contacts([trial])["along y (N)"]}
+    assert {*up} == {"r", "l"}
+    stride = found.stride.times
+    assert np.trapezoid(up["r"] + up["l"], stride) / stride[-1] == pytest.approx(WEIGHT, rel=0.03)
+    assert {*_controls([trial])} == {name.rpartition("/")[2][:-2] for name in found.controls.columns}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"parameters": {"mass": 1.0}}, "has parameters of its own"),
+        ({"times": np.linspace(0.5, 1.0, 3)}, "begins at 0.5 s"),
+    ],
+)
+def test_what_is_not_simulated(change, said, walk):
+    folder, found = walk
+    with pytest.raises(osimlite.OsimliteError, match=said):
+        simulated(osimlite.moco.problem_of(folder / "human-walks.omoco"), replace(found.trajectory, **change))
