@@ -61,8 +61,8 @@ def measured(scenario: Scenario, seconds: float, steps: int) -> list[tuple[str, 
         for accuracy in accuracies:
             result, took = ends(method, accuracy)
             off = result - wanted
-            errors = [float(np.sqrt(np.mean(part**2))) for part in (off[:, :size], off[:, size:])]
-            found.append((method, accuracy, *errors, passed / took))
+            of_values, of_speeds = (float(np.sqrt(np.mean(part**2))) for part in (off[:, :size], off[:, size:]))
+            found.append((method, accuracy, of_values, of_speeds, passed / took))
     return found
 
 
