@@ -1,4 +1,4 @@
-"""Work and precision of the integrators on a walk: from states along it, excitations held, to the end of a control step.
+"""Work and precision of integrators on a walk: from states along it, excitations held, to the end of a control step.
 
     python benchmarks/walk_precision.py [SCENARIO.scone] [SECONDS] [--steps N] [--picture FILE.png]
 

@@ -132,7 +132,9 @@ def _contacts(packed: Packed, forces: Forces, found: Evaluated) -> list[tuple[st
     for element, items in zip(forces.elements, packed.items, strict=True):
         if isinstance(element, PairContact):
             folder = element.path.rpartition("/")[0]
-            pairs += [(f"{folder}/{element.pair_name(k)}", place) for k, (place, _) in enumerate(items)]
+            pairs += [
+                (f"{folder}/{element.pair_name(k)}", place) for k, (place, _) in enumerate(items[: len(element.pairs)])
+            ]
         elif isinstance(element, DeclaredForce) and element.kind.geometry is SPHERE_ON_PLANE and items:
             pairs.append((element.path, items[-1][0] + len(element.kind.recorded)))
     return [

@@ -154,6 +154,27 @@ def contact_force(
     return along(times(f, n), f * friction(w, us, ud, uv, vt) / w, slip)
 
 
+def contact_derivatives(
+    d: float, R: float, k: float, c: float, us: float, ud: float, uv: float, vt: float, n: Vector, v: Vector
+) -> tuple[float, float, float]:
+    """How the force of `contact_force`, whose arguments these are, changes where surfaces are pressed and slip.
+
+    Returns:
+        Of the force along n its derivatives by the depth (N/m) and by the approach v n (N s/m), and the force across n
+        over the slip (N s/m); all 0 where there is no force.
+    """
+    if d <= 0.0:
+        return 0.0, 0.0, 0.0
+    vn = dot(v, n)
+    elastic = (4.0 / 3.0) * k * d * sqrt(R * k * d)
+    f = elastic * (1.0 + 1.5 * c * vn)
+    if f <= 0.0:
+        return 0.0, 0.0, 0.0
+    # Without slip it is the limit: the coefficient grows in proportion.
+    w = max(norm(along(v, -vn, n)), 1e-6 * vt, 1e-12)
+    return 1.5 * f / d, 1.5 * c * elastic, f * friction(w, us, ud, uv, vt) / w
+
+
 def contact_energy(d: float, R: float, k: float) -> float:
     """Potential energy of the elastic part, (8/15) k d^2 sqrt(R k d), in J.
 

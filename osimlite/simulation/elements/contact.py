@@ -17,12 +17,14 @@ from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.tree import Use
 from osimlite.simulation.elements.gather import ElementBuilder, Triple, kind_of, triple
-from osimlite.simulation.elements.items import Item, Places
-from osimlite.simulation.kernels.layout import CONTACT_WORK
+from osimlite.simulation.elements.items import Item, Places, Response
+from osimlite.simulation.kernels.layout import CONTACT_WORK, ITEM
 from osimlite.simulation.states import StateVariable
 
 if TYPE_CHECKING:
     from osimlite.simulation.elements.triangle_mesh import TriangleMesh
+
+RESPONSE = "contact_response"
 
 Material = tuple[float, float, float, float, float]
 """Stiffness, dissipation, and coefficients of static, dynamic and viscous friction of a surface, as in the model."""
@@ -95,6 +97,21 @@ class PairContact:
             result.append(Item(kernel, links, numbers, is_contact=True, is_part=self.early_return))
         if self.early_return:
             result.append(self._early_return(places))
+        else:
+            result += self._responses()
+        return result
+
+    def _responses(self) -> list[Item]:
+        """What tells how the force of each pair of half spaces and spheres changes, along its normal and across it."""
+        result, back = [], (ITEM.OWN + 2) * len(self.pairs)
+        for pair in self.pairs:
+            one, two = self.surfaces[pair.first], self.surfaces[pair.second]
+            if not (one.radii or two.radii):
+                for axis in range(3):
+                    ints = back, axis, int(one.is_half_space)
+                    result.append(Item(RESPONSE, ints, is_part=True, response=Response(RESPONSE, 0, 0, 1)))
+                    back += ITEM.OWN + len(ints)
+            back -= ITEM.OWN + 2
         return result
 
     def pair_numbers(self, pair: ContactPair, places: Places) -> tuple[tuple[int, int], tuple[float, ...]]:

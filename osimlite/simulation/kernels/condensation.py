@@ -5,8 +5,9 @@ Here J is what muscles, springs and stops make of it: each pushes along one disp
 its states that depend on that displacement, its speed and these states only. So its states are eliminated by
 themselves, as internal variables of a material are in finite elements, and so are the coordinates, whose rates count
 as the speeds. What is left is symmetric and of the size of the speeds: the mass matrix, and of each force a stiffness
-along its generalized force of 1 N. The equations of constraints count as heavy masses along them. All else (gravity,
-Coriolis forces, contacts) is left out of J: iterations converge without it, and W-methods keep their order.
+along its generalized force of 1 N. The equations of constraints count as heavy masses along them. Contacts of
+half spaces and spheres are three such forces, along the normal and across it. All else (gravity, Coriolis forces, that
+friction grows with the normal force) is left out of J: iterations converge without it, and W-methods keep their order.
 """
 
 from __future__ import annotations
@@ -71,10 +72,13 @@ def linearise(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, room: Floats)
         status = call(response[KERNEL], s, x, w, y, f, response[ITEM])
         if status != OUTCOME.OK:
             return status
+        changes = response[STATES] > 0
         for k in range(INVERSE):
             known[size + k] = w[WORK.SCRATCH + k]
-        generalized_forces(s, w, right)
+            changes = changes or w[WORK.SCRATCH + k] != 0.0
         first, end = size, 0
+        if changes:
+            generalized_forces(s, w, right)
         for k in range(size):
             known[k] = right[k]
             if abs(right[k]) > SLIGHT:

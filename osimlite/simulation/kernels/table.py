@@ -44,6 +44,7 @@ LAW_MODULES = {
     "amount_by_arc": "constant_curvature",
     "touch_half_space": "contacts",
     "touch_spheres": "contacts",
+    "contact_response": "contacts",
     "touch_ellipsoid": "rare_contacts",
     "touch_ellipsoids": "rare_contacts",
     "early_return": "rare_contacts",
