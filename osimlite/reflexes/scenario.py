@@ -24,7 +24,8 @@ from osimlite.simulation.kernels.walks import BEGIN, FEEL, GOING, START, STEPS
 from osimlite.text import listed, or_known
 
 OPTIMIZERS = "CmaOptimizer", "CmaPoolOptimizer"
-INTEGRATORS = {"SemiExplicitEuler2": "euler2", "RungeKuttaMerson": "merson"}
+INTEGRATORS = {"SemiExplicitEuler2": "euler2", "RungeKuttaMerson": "merson", "Rosenbrock": "rosenbrock"}
+"""By the names of SCONE; the last is ours."""
 POPULATION, GENERATIONS = 16, 1000
 """Of a search whose scenario says nothing."""
 LEFT_ASIDE = (

@@ -185,6 +185,19 @@ def test_the_scenario_says_how_to_search_and_step(arm) -> None:
     assert counts[0] == 50
 
 
+def test_implicit_steps_do_not_shrink_where_feet_touch(ours) -> None:
+    text = (ours.folder / "human-walks.scone").read_text()
+    method = "ModelOpenSim4 {\n integration_method = Rosenbrock integration_accuracy = 0.01"
+    (ours.folder / "implicit.scone").write_text(text.replace("ModelOpenSim4 {", method))
+    walked, wanted = (Scenario(ours.folder / f"{name}.scone") for name in ("implicit", "human-walks"))
+    steps = []
+    for scenario in (walked, wanted):
+        result = scenario.walk(scenario.best(), duration=0.5)
+        steps.append(scenario.walkers(1).copies._batch.counts[0, 0])
+        assert result.times[0] == pytest.approx(0.5)
+    assert 0 < steps[0] < 4 <= steps[1]
+
+
 def test_gaits_need_legs(arm) -> None:
     arm.write_text(
         arm.read_text().replace("DofMeasure { dof = elbow", "GaitMeasure { name = gait #").replace("#", "#\n}#")
