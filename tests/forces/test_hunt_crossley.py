@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from osimlite.forces.hunt_crossley import (
     combine_materials,
+    contact_derivatives,
     contact_energy,
     contact_force,
     half_space_sphere,
@@ -407,3 +408,30 @@ def test_what_is_not_a_number_is_not_hidden(place):
     contact = [0.01, 0.05, 5e3, 1.0, 0.8, 0.4, 0.4, 0.0, 1.0, 0.0, 0.3, 0.1, 0.2]
     contact[place] = math.nan
     assert any(map(math.isnan, law(contact, 0.2)))
+
+
+# ------------------------------------------------------------------------------------------------- derivatives
+@given(st.floats(1e-4, 0.02), st.floats(-0.3, 0.3), st.floats(1e-4, 0.5), st.floats(0.0, 6.3))
+def test_derivatives_are_those_of_the_force(d, approach, slip, turn):
+    numbers, n, h = (0.05, 4e3, 1.2, 0.8, 0.4, 0.1, 0.1), (0.0, 1.0, 0.0), 1e-6
+
+    def force(deeper, faster):
+        v = slip * math.cos(turn), approach + faster, slip * math.sin(turn)
+        return np.array(contact_force(d + deeper, *numbers, n, v))
+
+    by_depth, by_speed, across = contact_derivatives(
+        d, *numbers, n, (slip * math.cos(turn), approach, slip * math.sin(turn))
+    )
+    there = force(0.0, 0.0)
+    scale = max(1.0, there[1])
+    assert by_depth == pytest.approx((force(d * h, 0.0) - force(-d * h, 0.0))[1] / (2.0 * d * h), abs=1e-5 * scale / d)
+    assert by_speed == pytest.approx((force(0.0, h) - force(0.0, -h))[1] / (2.0 * h), abs=1e-3 * scale)
+    assert across * slip == pytest.approx(math.hypot(there[0], there[2]), rel=1e-9)
+
+
+def test_without_slip_friction_grows_in_proportion():
+    numbers, n = (0.05, 4e3, 1.2, 0.8, 0.4, 0.1, 0.1), (0.0, 1.0, 0.0)
+    _, _, still = contact_derivatives(0.01, *numbers, n, ZERO)
+    _, _, slow = contact_derivatives(0.01, *numbers, n, (1e-6, 0.0, 0.0))
+    assert still == pytest.approx(slow, rel=1e-4)
+    assert contact_derivatives(-0.01, *numbers, n, ZERO) == (0.0, 0.0, 0.0)

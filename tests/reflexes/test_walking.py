@@ -198,6 +198,28 @@ def test_implicit_steps_do_not_shrink_where_feet_touch(ours) -> None:
     assert 0 < steps[0] < 4 <= steps[1]
 
 
+def bumpy(model, height, seed):
+    """A model whose floor has bumps, some three a metre, of up to a height (m)."""
+    model, rng = model.copy_deep(), np.random.default_rng(seed)
+    tops = [(0.5 + 0.3 * k + rng.uniform(-0.1, 0.1), height * rng.uniform(0.3, 1.0)) for k in range(45)]
+    bumps = [
+        osimlite.ContactSphere(name=f"bump{k}", socket_frame="/ground", radius=0.5, location=(x, y - 0.5, 0.0))
+        for k, (x, y) in enumerate(tops)
+    ]
+    model.add(*bumps)
+    for force in model.components(osimlite.HuntCrossleyForce):
+        for parameters in force.contact_parameters.objects:
+            parameters.geometry = (*parameters.geometry, *(bump.name for bump in bumps))
+    return model
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_our_human_walks_over_uneven_ground(ours, seed) -> None:
+    scenario = Scenario(ours.folder / "human-walks.scone", bumpy(ours.model, 0.005, seed))
+    walked = scenario.walk(scenario.best())
+    assert walked.times[0] == pytest.approx(10.0) and walked.report["speed"][0] > 1.1
+
+
 def test_gaits_need_legs(arm) -> None:
     arm.write_text(
         arm.read_text().replace("DofMeasure { dof = elbow", "GaitMeasure { name = gait #").replace("#", "#\n}#")
