@@ -220,7 +220,7 @@ ONE = osimlite.MocoContactImpulseTrackingGoalGroup(external_force_name="foot")
         (osimlite.MocoGeneralizedForceTrackingGoal, {}, "names no table"),
         (osimlite.MocoGeneralizedForceTrackingGoal, {"force_paths": ["/tau2"]}, "no force '/tau2'; did you mean '/tau"),
         (osimlite.MocoGeneralizedForceTrackingGoal, {"force_paths": ["/tau0", "/tau."]}, "match '/tau0' twice"),
-        (osimlite.MocoGeneralizedForceTrackingGoal, {"force_paths": ["/tau("]}, "the pattern '/tau\\(' is none"),
+        (osimlite.MocoGeneralizedForceTrackingGoal, {"force_paths": ["/tau("]}, "'/tau\\(' is no pattern"),
         (osimlite.MocoContactImpulseTrackingGoal, {}, "its impulse_axis is -1"),
         (osimlite.MocoContactImpulseTrackingGoal, {"impulse_axis": 1}, "it has 0 contact_groups"),
         (
