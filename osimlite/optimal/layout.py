@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from osimlite.multibody.smoothing_spline import SampledCurves
 from osimlite.multibody.spatial import Array
-from osimlite.optimal.bounds import Bounds, middle, range_of
+from osimlite.optimal.bounds import Bounds, middle, range_of, scaling
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
@@ -92,6 +93,21 @@ class Layout:
         if kind == "slacks" and not self.problem.projects:
             return not self.problem.grid.is_mesh[point]
         return kind not in ("slacks", "projections") or bool(point and self.problem.grid.is_mesh[point])
+
+    @cached_property
+    def scaling(self) -> tuple[Array, Array]:
+        """Factors (n,) and offsets (n,) that the variables have by those that the search takes: each by its own bounds,
+        where Moco 4.6 takes those of the last one of its kind for all."""
+        scale, shift = np.ones(len(self.lower)), np.zeros(len(self.lower))
+        if not self.problem.solver.scale_variables_using_bounds:
+            return scale, shift
+        pairs: list[Any] = [*enumerate([*self.problem.times, *self.problem.parameters.values()])]
+        for kind in KINDS:
+            for column, item in zip(self.places_of[kind].T, self.bounds[kind], strict=True):
+                pairs.append((column[column >= 0], item.within))
+        for places, (low, high) in pairs:
+            scale[places], shift[places] = scaling(low, high)
+        return scale, shift
 
     def guess(self) -> Array:
         """The middle between the bounds of each, as Moco begins."""

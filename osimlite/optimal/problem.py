@@ -18,7 +18,7 @@ from osimlite.errors import SettingError
 from osimlite.modifying.processing import processed
 from osimlite.multibody.spatial import Array
 from osimlite.optimal.asked import Asked
-from osimlite.optimal.bounds import FREE, Range, control_bounds, range_of, state_bounds
+from osimlite.optimal.bounds import FREE, Range, control_bounds, range_of, scaling, state_bounds
 from osimlite.optimal.dynamics import Dynamics
 from osimlite.optimal.given_motion import GivenDynamics, GivenMotion, Motion, motion_of
 from osimlite.optimal.layout import PROJECTED
@@ -195,8 +195,6 @@ class Problem(Asked):
                 raise self.wrong(self.phase, f"{message}; take a CustomJoint")
 
     def _refuse_settings(self) -> None:
-        if self.solver.scale_variables_using_bounds:
-            raise self.refused(self.solver, "scale_variables_using_bounds is not done here yet")
         if self.solver.optim_solver != "ipopt":
             raise self.refused(self.solver, f"of optimizers only ipopt is known, not {self.solver.optim_solver}")
 
@@ -205,23 +203,33 @@ class Problem(Asked):
         solver, first = self.solver, len(self.functions.coordinates) if self.dynamics.is_implicit else 0
         if solver.minimize_lagrange_multipliers and not self.constraint_names:
             raise self.wrong(solver, "minimize_lagrange_multipliers needs constraints, and the model has none")
-        for name, wanted, weight, part in (
-            ("multipliers", solver.minimize_lagrange_multipliers, solver.lagrange_multiplier_weight, "multipliers"),
+        for name, wanted, weight, part, bounds in (
+            (
+                "multipliers",
+                solver.minimize_lagrange_multipliers,
+                solver.lagrange_multiplier_weight,
+                "multipliers",
+                self.phase.multiplier_bounds,
+            ),
             (
                 "accelerations",
                 solver.minimize_implicit_multibody_accelerations and self.dynamics.is_implicit,
                 solver.implicit_multibody_accelerations_weight,
                 slice(None, first),
+                solver.implicit_multibody_acceleration_bounds,
             ),
             (
                 "auxiliary_derivatives",
                 solver.minimize_implicit_auxiliary_derivatives and bool(self.dynamics.tendons.names),
                 solver.implicit_auxiliary_derivatives_weight,
                 slice(first, None),
+                solver.implicit_auxiliary_derivative_bounds,
             ),
         ):
             if wanted:
-                yield MocoControlGoal(name=name, weight=weight), integral(partial(_squares, part))
+                # What Moco makes a cost are the variables as they are scaled.
+                by = scaling(*(range_of(bounds) or FREE)) if solver.scale_variables_using_bounds else (1.0, 0.0)
+                yield MocoControlGoal(name=name, weight=weight), integral(partial(_squares, part, by))
         if solver.minimize_state_projection_distance and self.projects:
             goal = MocoControlGoal(name="state_projection", weight=solver.state_projection_distance_weight)
             yield goal, replace(integral(_way), is_sum=True)
@@ -308,10 +316,10 @@ def _way(point: Point) -> Formula:
     return casadi.sumsqr(point.projections - point.x[: point.projections.numel()])
 
 
-def _squares(part: str | slice, point: Point) -> Formula:
-    """Of the multipliers, or of some of the derivatives that are variables."""
+def _squares(part: str | slice, by: tuple[float, float], point: Point) -> Formula:
+    """Of the multipliers, or of some of the derivatives that are variables, as they are scaled."""
     column = point.multipliers if isinstance(part, str) else point.derivatives[part]
-    return column.T @ column
+    return casadi.sumsqr((column - by[1]) / by[0])
 
 
 def _by_constraint(model: Model, count: int) -> Iterable[tuple[int, int]]:

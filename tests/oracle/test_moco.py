@@ -343,6 +343,29 @@ def test_states_that_are_moved_onto_constraints(scheme, mode, tmp_path):
     assert objective <= sum(theirs.values()) * (1.0 + 1e-4)
 
 
+SCALED = """
+import opensim as osim
+from tests.oracle.moco_studies import ended
+study = osim.MocoStudy("squat-25.omoco")
+solver = osim.MocoCasADiSolver.safeDownCast(study.updSolver())
+solver.set_scale_variables_using_bounds(True)
+solver.set_minimize_lagrange_multipliers(True)
+solver.set_multibody_dynamics_mode("implicit")
+solver.set_minimize_implicit_multibody_accelerations(True)
+solver.set_optim_max_iterations(2)
+ended(study)
+"""
+
+
+def test_costs_of_scaled_variables(tmp_path):
+    """After two of its iterations Moco's costs of multipliers and accelerations are those that are found here."""
+    pytest.importorskip("opensim")
+    study_file(tmp_path, "squat-25")
+    theirs, ours = (_said(tmp_path, ["-c", code]) for code in (SCALED, OUR_LOADS))
+    assert {"multipliers", "accelerations"} < theirs.keys()
+    assert ours == pytest.approx(theirs, rel=1e-9)
+
+
 TRACKED = """
 import json
 import opensim as osim
