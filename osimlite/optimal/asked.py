@@ -96,7 +96,7 @@ class Asked:
                     if spec.name in part.model_fields_set and (fault := _fault(spec, word)):
                         raise self.wrong(part, f"{spec.tag} is {word!r}{fault}")
             for name in ("bounds", "initial_bounds", "final_bounds"):
-                ends = getattr(part, name, ())
+                ends: Any = getattr(part, name, ())
                 if len(ends) == 2 and isinstance(ends[0], float) and ends[0] > ends[1]:
                     raise self.wrong(part, f"{name} from {ends[0]:g} to {ends[1]:g} leave no value")
 

@@ -109,6 +109,15 @@ def state_bounds(
     return result
 
 
+def scaling(low: float, high: float) -> tuple[float, float]:
+    """Factor and offset that a variable has by its scaled self, as Moco makes them: the width of its bounds, and the
+    middle between them with the other sign."""
+    width = high - low
+    if not math.isfinite(width):
+        return 1.0, 0.0
+    return (width, -0.5 * (high + low)) if width else (1.0, high)
+
+
 def middle(low: float, high: float) -> float:
     """Where a search begins: between the bounds, at the only one, or at zero."""
     if math.isinf(low):

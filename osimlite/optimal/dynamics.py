@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from osimlite.backends.symbols import casadi
@@ -17,7 +17,8 @@ class Dynamics:
     """What rates are, and what must be zero, at a point.
 
     Multipliers are variables of their own at all points, and push as ``Gᵀ multipliers``; the model's constraints are
-    equations of points of the mesh (M. Posa et al., ICRA 2016).
+    equations of points of the mesh (M. Posa et al., ICRA 2016), accelerations of all points if intervals lead to states
+    that are moved onto them (R. Bordalba et al., IEEE Transactions on Robotics 39, 2023).
 
     Attributes:
         is_implicit: whether accelerations are variables.
@@ -73,7 +74,7 @@ class Dynamics:
     def corrected(self, point: Point) -> Formula:
         """The rates, with the correction of velocities that keeps states on the constraints."""
         rates = point.rates
-        if not point.slacks.numel():
+        if self.problem.projects or not point.slacks.numel():
             return rates
         g = self.functions.constraints(point.t, point.x, rates, point.p)[3]
         return casadi.vertcat(rates[: self.size] + g.T @ point.slacks, rates[self.size :])
@@ -83,16 +84,34 @@ class Dynamics:
         names, errors = self.tendons.residuals(point, point.derivatives[self._first_rate :])
         if not self.is_implicit:
             return names, errors
-        f, size = self.functions, self.size
+        f, size, point = self.functions, self.size, point.reached
         rows = f.residual(point.t, point.x, point.rates, point.u, point.p, point.multipliers)[size : 2 * size]
         return [*(f"{path} residual" for path in f.coordinates), *names], casadi.vertcat(rows, errors)
 
-    def constraint_errors(self, point: Point, with_derivatives: bool) -> tuple[list[str], Formula]:
-        """Errors of the model's constraints, with their names."""
-        f = self.functions
-        position, velocity, acceleration, _ = f.constraints(point.t, point.x, point.rates, point.p)
-        own = self.problem.constraint_names
-        if not with_derivatives:
+    def constraint_errors(self, point: Point, is_mesh: bool) -> tuple[list[str], Formula]:
+        """Errors of the model's constraints at a point, with their names."""
+        problem, own = self.problem, self.problem.constraint_names
+        if not (own and (is_mesh or problem.projects)):
+            return [], casadi.SX(0, 1)
+        position, velocity, _, _ = self._bound(point)
+        acceleration = self._bound(point.reached)[2]
+        if not is_mesh:
+            return [f"{name}dd" for name in own], acceleration
+        if not problem.solver.enforce_constraint_derivatives:
             return own, position
         names = [*own, *(f"{name}d" for name in own), *(f"{name}dd" for name in own)]
         return names, casadi.vertcat(position, velocity, acceleration)
+
+    def _bound(self, point: Point) -> Sequence[Formula]:
+        """Errors of positions, speeds and accelerations, and the matrix G."""
+        found: Sequence[Formula] = self.functions.constraints(point.t, point.x, point.rates, point.p)
+        return found
+
+    def projection_errors(self, point: Point) -> tuple[list[str], Formula]:
+        """How far values and speeds are from those that the interval leads to, moved along the constraints; with names.
+
+        Of the slacks the first half, as Moco has them, moves values and the second speeds.
+        """
+        names, g = self.problem.projected_names, self._bound(point)[3]
+        moved = casadi.vertcat(*(g.T @ part for part in casadi.vertsplit(point.slacks, g.size1())))
+        return names, point.x[: len(names)] - point.projections - moved

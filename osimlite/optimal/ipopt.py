@@ -133,14 +133,15 @@ def solve(
         "jac_g": search.jacobian,
     }
     if settings.optim_hessian_approximation == "exact":
-        options["hess_lag"] = _curved(program)
+        options["hess_lag"] = _curved(program, search)
     before = time.perf_counter()
     solver = casadi.nlpsol("moco", "ipopt", search.program_itself, options)
+    lower, upper = program.layout.lower, program.layout.upper
     with search.interruptible():
         found = solver(
-            x0=np.clip(guess, program.layout.lower, program.layout.upper),
-            lbx=program.layout.lower,
-            ubx=program.layout.upper,
+            x0=search.scaled(np.clip(guess, lower, upper)),
+            lbx=search.scaled(lower),
+            ubx=search.scaled(upper),
             lbg=program.lower,
             ubg=program.upper,
         )
@@ -148,7 +149,7 @@ def solve(
     status = stats["return_status"]
     if not np.isfinite(np.array(found["f"])).all() or status == "Invalid_Number_Detected":
         raise SimulationError(_no_number(program, guess))
-    w = np.array(found["x"]).ravel()
+    w = search.real(np.array(found["x"]).ravel())
     if not stats["success"] and search.best is not None:
         w = search.best
     return Found(w, status, bool(stats["success"]), int(stats["iter_count"]), took)
@@ -231,6 +232,9 @@ class _Search(casadi.Callback):  # type: ignore[misc]
         self._best = (np.inf, np.inf)
         self._at: Array | None = None
         self._slopes: Any = None
+        self.scale, self.shift = program.layout.scaling
+        columns = np.array(program.jacobian_sparsity.get_triplet()[1], dtype=int)
+        self._of_columns = self.scale[columns]
         width, rows = len(program.layout.lower), len(program.labels)
         given = {"x": _column(width), "p": casadi.Sparsity(0, 0)}
         self._sizes = {"f": 1, "x": width, "lam_x": width, "g": rows, "lam_g": rows, "lam_p": 0}
@@ -242,20 +246,28 @@ class _Search(casadi.Callback):  # type: ignore[misc]
         )
         self.construct("told", {})
 
-    def _values(self, w: Array, *_: Array) -> tuple[Any, ...]:
-        costs, rows = self.program.values(w)
+    def real(self, x: Array) -> Array:
+        """The variables, of those that Ipopt has."""
+        return self.scale * x + self.shift
+
+    def scaled(self, w: Array) -> Array:
+        """The reverse of `real`."""
+        return (w - self.shift) / self.scale
+
+    def _values(self, x: Array, *_: Array) -> tuple[Any, ...]:
+        costs, rows = self.program.values(self.real(x))
         return costs.sum(), rows
 
-    def _both(self, w: Array) -> tuple[Array, Array]:
-        if self._at is None or not np.array_equal(self._at, w):
-            self._at, self._slopes = w.copy(), self.program.slopes(w)
+    def _both(self, x: Array) -> tuple[Array, Array]:
+        if self._at is None or not np.array_equal(self._at, x):
+            self._at, self._slopes = x.copy(), self.program.slopes(self.real(x))
         return self._slopes
 
-    def _gradient(self, w: Array, *_: Array) -> tuple[Any, ...]:
-        return 0.0, self._both(w)[0]
+    def _gradient(self, x: Array, *_: Array) -> tuple[Any, ...]:
+        return 0.0, self._both(x)[0] * self.scale
 
-    def _jacobian(self, w: Array, *_: Array) -> tuple[Any, ...]:
-        return np.zeros(len(self.program.labels)), self._both(w)[1]
+    def _jacobian(self, x: Array, *_: Array) -> tuple[Any, ...]:
+        return np.zeros(len(self.program.labels)), self._both(x)[1] * self._of_columns
 
     # ---------------------------------------------------------------------------------------- after an iteration
     def get_n_in(self) -> int:
@@ -275,7 +287,7 @@ class _Search(casadi.Callback):  # type: ignore[misc]
 
     def eval(self, given: Any) -> Any:
         names = {casadi.nlpsol_out(place): place for place in range(len(given))}
-        w, rows = (np.array(given[names[name]]).ravel() for name in ("x", "g"))
+        w, rows = self.real(np.array(given[names["x"]]).ravel()), np.array(given[names["g"]]).ravel()
         objective = float(given[names["f"]])
         found = violations(self.program, w, rows, most=1)
         size = found[0].size if found else 0.0
@@ -306,8 +318,9 @@ class _Search(casadi.Callback):  # type: ignore[misc]
             signal.signal(signal.SIGINT, before)
 
 
-def _curved(program: Program) -> Any:
+def _curved(program: Program, search: _Search) -> Any:
     hessian = Hessian(program)
+    first, second = (search.scale[np.array(places, dtype=int)] for places in hessian.sparsity.get_triplet())
     given = {
         "x": _column(len(program.layout.lower)),
         "p": casadi.Sparsity(0, 0),
@@ -315,7 +328,7 @@ def _curved(program: Program) -> Any:
         "lam_g": _column(len(program.labels)),
     }
 
-    def law(w: Array, *rest: Array) -> tuple[Any, ...]:
-        return (hessian.numbers(w, float(rest[-2][0]), rest[-1]),)
+    def law(x: Array, *rest: Array) -> tuple[Any, ...]:
+        return (hessian.numbers(search.real(x), float(rest[-2][0]), rest[-1]) * first * second,)
 
     return _Function("nlp_hess_l", given, {"hess_gamma_x_x": hessian.sparsity}, law)

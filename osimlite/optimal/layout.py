@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from osimlite.multibody.smoothing_spline import SampledCurves
 from osimlite.multibody.spatial import Array
-from osimlite.optimal.bounds import Bounds, middle, range_of
+from osimlite.optimal.bounds import Bounds, middle, range_of, scaling
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
 
 FEWEST = 6
 """Times that splines of fifth degree need."""
-KINDS = "states", "controls", "multipliers", "derivatives", "slacks"
+KINDS = "states", "controls", "multipliers", "derivatives", "slacks", "projections"
 """What a point may have variables of, in this order."""
+PROJECTED = "/projection"
+"""Ending of the names of states where an interval leads to, before they are moved onto the constraints."""
 
 
 class Layout:
@@ -42,11 +45,13 @@ class Layout:
             "multipliers": multipliers,
             "derivatives": [*accelerations, *problem.dynamics.tendons.names],
             "slacks": problem.slack_names,
+            "projections": problem.projected_names,
         }
         force = range_of(problem.phase.multiplier_bounds) or (-np.inf, np.inf)
         acceleration = range_of(solver.implicit_multibody_acceleration_bounds) or (-np.inf, np.inf)
         rate = range_of(solver.implicit_auxiliary_derivative_bounds) or (-np.inf, np.inf)
-        correction = range_of(solver.velocity_correction_bounds) or (-np.inf, np.inf)
+        of_slacks = solver.projection_slack_variable_bounds if problem.projects else solver.velocity_correction_bounds
+        correction = range_of(of_slacks) or (-np.inf, np.inf)
         self.bounds: dict[str, list[Bounds]] = {
             "states": [*problem.states.values()],
             "controls": [*problem.controls.values()],
@@ -56,6 +61,7 @@ class Layout:
                 *[Bounds.of(rate)] * len(problem.dynamics.tendons.names),
             ],
             "slacks": [Bounds.of(correction)] * len(problem.slack_names),
+            "projections": [*problem.states.values()][: len(problem.projected_names)],
         }
         self.shared = 2 + len(problem.parameters)
         ranges = [*problem.times, *problem.parameters.values()]
@@ -66,7 +72,7 @@ class Layout:
         for point in range(len(grid.places)):
             first = size
             for kind in KINDS:
-                if kind == "slacks" and grid.is_mesh[point]:
+                if not self.has(kind, point):
                     continue
                 for number, bounds in enumerate(self.bounds[kind]):
                     low, high = bounds.first if point == 0 else bounds.last if point == end else bounds.within
@@ -81,6 +87,28 @@ class Layout:
             message = f"all bounds of '{self.name_at(place)}' together leave no value ({ends})"
             raise problem.wrong(problem.phase, message)
 
+    def has(self, kind: str, point: int) -> bool:
+        """Whether a point has variables of a kind: corrections of velocities are between nodes, projections at the ends
+        of intervals."""
+        if kind == "slacks" and not self.problem.projects:
+            return not self.problem.grid.is_mesh[point]
+        return kind not in ("slacks", "projections") or bool(point and self.problem.grid.is_mesh[point])
+
+    @cached_property
+    def scaling(self) -> tuple[Array, Array]:
+        """Factors (n,) and offsets (n,) that the variables have by those that the search takes: each by its own bounds,
+        where Moco 4.6 takes those of the last one of its kind for all."""
+        scale, shift = np.ones(len(self.lower)), np.zeros(len(self.lower))
+        if not self.problem.solver.scale_variables_using_bounds:
+            return scale, shift
+        pairs: list[Any] = [*enumerate([*self.problem.times, *self.problem.parameters.values()])]
+        for kind in KINDS:
+            for column, item in zip(self.places_of[kind].T, self.bounds[kind], strict=True):
+                pairs.append((column[column >= 0], item.within))
+        for places, (low, high) in pairs:
+            scale[places], shift[places] = scaling(low, high)
+        return scale, shift
+
     def guess(self) -> Array:
         """The middle between the bounds of each, as Moco begins."""
         return np.array([middle(low, high) for low, high in zip(self.lower, self.upper, strict=True)])
@@ -92,7 +120,7 @@ class Layout:
         at = times[0] + self.problem.grid.places * (times[-1] - times[0])
         for kind in KINDS:
             for number, name in enumerate(self.names[kind]):
-                column = trajectory.columns.get(name)
+                column = trajectory.columns.get(name.removesuffix(PROJECTED))
                 if column is not None:
                     places = self.places_of[kind][:, number]
                     result[places[places >= 0]] = _resampled(times, column, at)[places >= 0]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from osimlite.backends.symbols import casadi
 from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, field
+from osimlite.records import dataclass, field, replace
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
@@ -50,9 +50,11 @@ class Point:
         u: controls, in the order of `problem.functions.controls`.
         multipliers: of the model's constraints.
         derivatives: that are variables: accelerations, and rates of auxiliary states; empty if explicit.
-        slacks: of velocity corrections, if the point has them.
+        slacks: of velocity corrections or projections, if the point has them.
         p: parameters.
         known: what the series are made of: the time that they are expanded about, and three numbers for each.
+        projections: values and speeds that the interval leads to, before they are moved onto the constraints, if the
+            point has them.
     """
 
     problem: Problem
@@ -64,7 +66,15 @@ class Point:
     slacks: Formula
     p: Formula
     known: Formula
+    projections: Formula = field(default_factory=lambda: casadi.SX(0, 1))
     _kept: dict[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def reached(self) -> Point:
+        """The same with the values and speeds that the interval leads to."""
+        size = self.projections.numel()
+        x = casadi.vertcat(self.projections, self.x[size:])
+        return replace(self, x=x, _kept={}) if size else self
 
     def state(self, path: str) -> Formula:
         """The state of a path."""
@@ -148,11 +158,13 @@ class Terms:
         integrand: at a point; None if nothing is integrated.
         modes: that the goal can have, first the one that it has where the study says nothing: COST, BOTH, CONSTRAINT.
             The cost of a goal that is a constraint first is the sum of the squares of its values, of others the sum.
+        is_sum: whether the integrand is added up over all points in the place of being integrated.
     """
 
     value: Callable[[Ends], Formula]
     integrand: Callable[[Point], Formula] | None = None
     modes: tuple[str, ...] = COST
+    is_sum: bool = False
 
 
 @dataclass(frozen=True, eq=False)

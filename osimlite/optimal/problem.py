@@ -13,15 +13,18 @@ import numpy as np
 
 from osimlite._load import module_name
 from osimlite.backends.functions import casadi as functions_of
+from osimlite.backends.symbols import casadi
 from osimlite.errors import SettingError
 from osimlite.modifying.processing import processed
 from osimlite.multibody.spatial import Array
 from osimlite.optimal.asked import Asked
-from osimlite.optimal.bounds import FREE, Range, control_bounds, range_of, state_bounds
+from osimlite.optimal.bounds import FREE, Range, control_bounds, range_of, scaling, state_bounds
 from osimlite.optimal.dynamics import Dynamics
 from osimlite.optimal.given_motion import GivenDynamics, GivenMotion, Motion, motion_of
+from osimlite.optimal.layout import PROJECTED
 from osimlite.optimal.point import Formula, Point, Rows, Series, Terms, integral
 from osimlite.optimal.schemes import Grid, scheme_named
+from osimlite.records import replace
 from osimlite.schema.base import Component, Object
 from osimlite.schema.controllers import Controller
 from osimlite.schema.coordinates import Coordinate
@@ -192,8 +195,6 @@ class Problem(Asked):
                 raise self.wrong(self.phase, f"{message}; take a CustomJoint")
 
     def _refuse_settings(self) -> None:
-        if self.solver.scale_variables_using_bounds:
-            raise self.refused(self.solver, "scale_variables_using_bounds is not done here yet")
         if self.solver.optim_solver != "ipopt":
             raise self.refused(self.solver, f"of optimizers only ipopt is known, not {self.solver.optim_solver}")
 
@@ -202,23 +203,36 @@ class Problem(Asked):
         solver, first = self.solver, len(self.functions.coordinates) if self.dynamics.is_implicit else 0
         if solver.minimize_lagrange_multipliers and not self.constraint_names:
             raise self.wrong(solver, "minimize_lagrange_multipliers needs constraints, and the model has none")
-        for name, wanted, weight, part in (
-            ("multipliers", solver.minimize_lagrange_multipliers, solver.lagrange_multiplier_weight, "multipliers"),
+        for name, wanted, weight, part, bounds in (
+            (
+                "multipliers",
+                solver.minimize_lagrange_multipliers,
+                solver.lagrange_multiplier_weight,
+                "multipliers",
+                self.phase.multiplier_bounds,
+            ),
             (
                 "accelerations",
                 solver.minimize_implicit_multibody_accelerations and self.dynamics.is_implicit,
                 solver.implicit_multibody_accelerations_weight,
                 slice(None, first),
+                solver.implicit_multibody_acceleration_bounds,
             ),
             (
                 "auxiliary_derivatives",
                 solver.minimize_implicit_auxiliary_derivatives and bool(self.dynamics.tendons.names),
                 solver.implicit_auxiliary_derivatives_weight,
                 slice(first, None),
+                solver.implicit_auxiliary_derivative_bounds,
             ),
         ):
             if wanted:
-                yield MocoControlGoal(name=name, weight=weight), integral(partial(_squares, part))
+                # What Moco makes a cost are the variables as they are scaled.
+                by = scaling(*(range_of(bounds) or FREE)) if solver.scale_variables_using_bounds else (1.0, 0.0)
+                yield MocoControlGoal(name=name, weight=weight), integral(partial(_squares, part, by))
+        if solver.minimize_state_projection_distance and self.projects:
+            goal = MocoControlGoal(name="state_projection", weight=solver.state_projection_distance_weight)
+            yield goal, replace(integral(_way), is_sum=True)
 
     def _expect_infos(self) -> None:
         for pattern in (*self.phase.state_infos_pattern, *self.phase.control_infos_pattern):
@@ -237,18 +251,16 @@ class Problem(Asked):
         if not count:
             return []
         solver = self.solver
-        if solver.kinematic_constraint_method != "Posa2016":
-            raise self.refused(
-                solver,
-                f"constraints of the model are met by Posa2016 only, and not by {solver.kinematic_constraint_method}",
-            )
-        if solver.transcription_scheme != "hermite-simpson" and solver.enforce_constraint_derivatives:
+        if solver.kinematic_constraint_method == "Bordalba2023":
+            if not solver.enforce_constraint_derivatives:
+                raise self.wrong(solver, "Bordalba2023 needs enforce_constraint_derivatives, as in Moco")
+        elif solver.transcription_scheme != "hermite-simpson" and solver.enforce_constraint_derivatives:
             message = "constraints of the model with Posa2016 need transcription_scheme hermite-simpson, as in Moco"
             raise self.wrong(solver, message)
         f = self.functions
         positions = f.constraints.size1_out(0)
         if positions != count:
-            raise self.refused(self.phase, "the model has constraints that bind speeds alone, which Posa2016 cannot")
+            raise self.refused(self.phase, "the model has constraints that bind speeds alone, which is not solved here")
         # OpenSim numbers constraints behind those that lock coordinates.
         coordinates = [part for part in self.components.values() if isinstance(part, Coordinate)]
         first = sum(1 + (part.prescribed_function is not None) for part in coordinates)
@@ -279,17 +291,35 @@ class Problem(Asked):
             raise self.wrong(goal, f"it cannot be of mode '{goal.mode}', as in Moco; it is a {terms.modes[0]}")
         return terms
 
+    @property
+    def projects(self) -> bool:
+        """Whether intervals lead to states that are moved onto the constraints."""
+        return bool(self.constraint_names) and self.solver.kinematic_constraint_method == "Bordalba2023"
+
+    @property
+    def projected_names(self) -> list[str]:
+        """Of values and speeds before they are moved."""
+        count = 2 * len(self.functions.coordinates) if self.projects else 0
+        return [f"{name}{PROJECTED}" for name in self.functions.states[:count]]
+
     @cached_property
     def slack_names(self) -> list[str]:
-        """Of the corrections of velocities."""
+        """Of the corrections of velocities, or of those of values and of speeds, which Moco names by turns."""
+        if self.projects:
+            return [f"mu_{name}{end}" for name in self.constraint_names for end in ("", "_dot")]
         wanted = self.solver.enforce_constraint_derivatives
         return [f"gamma_{name}" for name in self.constraint_names] if wanted else []
 
 
-def _squares(part: str | slice, point: Point) -> Formula:
-    """Of the multipliers, or of some of the derivatives that are variables."""
+def _way(point: Point) -> Formula:
+    """The square of how far states are moved at a point."""
+    return casadi.sumsqr(point.projections - point.x[: point.projections.numel()])
+
+
+def _squares(part: str | slice, by: tuple[float, float], point: Point) -> Formula:
+    """Of the multipliers, or of some of the derivatives that are variables, as they are scaled."""
     column = point.multipliers if isinstance(part, str) else point.derivatives[part]
-    return column.T @ column
+    return casadi.sumsqr((column - by[1]) / by[0])
 
 
 def _by_constraint(model: Model, count: int) -> Iterable[tuple[int, int]]:

@@ -31,10 +31,11 @@ class PointFunction:
         problem, layout = program.problem, program.layout
         self.numbers = np.array(numbers, dtype=int)
         self.columns = np.array([layout.places[number] for number in numbers])
+        self.projected = len(layout.names["projections"]) if layout.has("projections", numbers[0]) else 0
         size = self.columns.shape[1]
         s, z = SX.sym("s", layout.shared), SX.sym("z", size)
         place, known = SX.sym("place"), SX.sym("known", program.known_size)
-        point = program.point(s, z, place, known, is_mesh=bool(problem.grid.is_mesh[numbers[0]]))
+        point = program.point(s, z, place, known, numbers[0])
         duration = s[1] - s[0]
         names, residuals = problem.dynamics.residuals(point)
         rows, labels, limits = [residuals], [*names], [(0.0, 0.0)] * len(names)
@@ -44,14 +45,22 @@ class PointFunction:
                 rows.append(own.formula(point))
                 labels += own.labels
                 limits += own.limits
-        if is_mesh and problem.constraint_names:
-            derived = bool(problem.solver.enforce_constraint_derivatives)
-            names, errors = problem.dynamics.constraint_errors(point, derived)
+        names, errors = problem.dynamics.constraint_errors(point, is_mesh)
+        rows.append(errors)
+        labels += names
+        limits += [range_of(problem.phase.kinematic_constraint_bounds) or (0.0, 0.0)] * len(names)
+        rates = [problem.dynamics.corrected(point)]
+        if self.projected:
+            rates.append(point.reached.rates[: self.projected])
+            names, errors = problem.dynamics.projection_errors(point)
             rows.append(errors)
             labels += names
-            limits += [range_of(problem.phase.kinematic_constraint_bounds) or (0.0, 0.0)] * len(names)
-        integrands = [duration * integrand(point) for _, integrand in program.integrals]
-        column = casadi.densify(casadi.vertcat(duration * problem.dynamics.corrected(point), *rows, *integrands))
+            limits += [(0.0, 0.0)] * len(names)
+        integrands = [
+            terms.integrand(point) if terms.is_sum else duration * terms.integrand(point)
+            for _, terms in program.integrals
+        ]
+        column = casadi.densify(casadi.vertcat(duration * casadi.vertcat(*rates), *rows, *integrands))
         self.labels, self.limits, self.rows = labels, limits, column.numel()
         given = [s, z, place, known]
         both, multipliers = casadi.vertcat(s, z), SX.sym("multipliers", self.rows)
@@ -99,12 +108,15 @@ class Program:
         self.upper: Array = np.zeros(0)
         self._sparse = require("scipy.sparse", extra="sim", purpose="optimal control")
         self.known_size = 1 + 3 * len(problem.series)
-        self.integrals = [(goal, terms.integrand) for goal, terms in problem.goals if terms.integrand is not None]
+        self.integrals: list[Any] = [(goal, terms) for goal, terms in problem.goals if terms.integrand is not None]
         points, is_mesh = range(len(problem.grid.places)), problem.grid.is_mesh
         sorts = [[k for k in points if is_mesh[k]], [k for k in points if not is_mesh[k]]]
         inside = problem.solver.enforce_path_constraint_mesh_interior_points or not problem.path_rows
         if inside and not problem.constraint_names:
             sorts = [[*points]]
+        if problem.projects:
+            # Nothing leads to the first point.
+            sorts = [[0], sorts[0][1:], sorts[1]]
         self.sorts = [PointFunction(self, numbers) for numbers in sorts if numbers]
         self._offsets = np.cumsum([0, *(sort.rows * len(sort.numbers) for sort in self.sorts)])
         self._assemble()
@@ -113,11 +125,11 @@ class Program:
         self._map_ends()
 
     # --------------------------------------------------------------------------------------------- formulas
-    def point(self, s: Any, z: Any, place: Any, known: Any, *, is_mesh: bool) -> Point:
-        """The formulas at a point of the grid."""
+    def point(self, s: Any, z: Any, place: Any, known: Any, number: int) -> Point:
+        """The formulas at a point of the grid, for all that have the same variables as one of them."""
         parts, first = {}, 0
         for kind in KINDS:
-            count = 0 if kind == "slacks" and is_mesh else len(self.layout.names[kind])
+            count = len(self.layout.names[kind]) if self.layout.has(kind, number) else 0
             parts[kind] = z[first : first + count]
             first += count
         parameters = [s[2 + owner] for owner in self.problem.parameter_owners]
@@ -129,6 +141,7 @@ class Program:
             multipliers=parts["multipliers"],
             derivatives=parts["derivatives"],
             slacks=parts["slacks"],
+            projections=parts["projections"],
             p=casadi.vertcat(*parameters) if parameters else SX(0, 1),
             known=known,
         )
@@ -141,8 +154,8 @@ class Program:
         z0, z1 = SX.sym("z0", len(layout.places[0])), SX.sym("z1", len(layout.places[last]))
         totals = SX.sym("integrals", len(self.integrals))
         known = [SX.sym(f"known{k}", self.known_size) for k in range(2)]
-        start = self.point(s, z0, SX(0.0), known[0], is_mesh=True)
-        end = self.point(s, z1, SX(1.0), known[1], is_mesh=True)
+        start = self.point(s, z0, SX(0.0), known[0], 0)
+        end = self.point(s, z1, SX(1.0), known[1], last)
         costs, rows = [], []
         self.costs: list[str] = []
         self.end_labels: list[str] = []
@@ -204,7 +217,7 @@ class Program:
         b: list[tuple[Any, Any, Any]] = []
         times: list[float] = []
         limits: list[tuple[float, float]] = []
-        row = 0
+        row, moved = 0, len(layout.names["projections"])
         interpolates = self.problem.solver.interpolate_control_mesh_interior_points
         for interval, length in enumerate(grid.lengths):
             points = grid.points_of(interval)
@@ -212,10 +225,15 @@ class Program:
             for own, rate in zip(scheme.states, scheme.rates, strict=True):
                 rows = row + np.arange(count)
                 for k, point in enumerate(points):
+                    places, at = layout.places_of["states"][point], np.arange(count)
+                    if point == points[-1] and moved:
+                        # What the interval leads to is moved onto the constraints afterwards.
+                        places = np.concatenate([layout.places_of["projections"][point], places[moved:]])
+                        at = np.concatenate([count + at[:moved], at[moved:]])
                     if own[k]:
-                        a.append((rows, layout.places_of["states"][point], np.full(count, own[k])))
+                        a.append((rows, places, np.full(count, own[k])))
                     if rate[k]:
-                        b.append((rows, start_of[point] + np.arange(count), np.full(count, length * rate[k])))
+                        b.append((rows, start_of[point] + at, np.full(count, length * rate[k])))
                 self.labels += [f"{name} defect" for name in states]
                 times += [middle] * count
                 limits += [(0.0, 0.0)] * count
@@ -232,16 +250,18 @@ class Program:
         for sort in self.sorts:
             many = len(sort.labels)
             for point in sort.numbers:
-                b.append((row + np.arange(many), start_of[point] + count + np.arange(many), np.ones(many)))
+                first = start_of[point] + count + sort.projected
+                b.append((row + np.arange(many), first + np.arange(many), np.ones(many)))
                 self.labels += sort.labels
                 times += [grid.places[point]] * many
                 limits += sort.limits
                 row += many
         self._rows = row
-        for k in range(len(self.integrals)):
+        for k, (_, terms) in enumerate(self.integrals):
             for sort in self.sorts:
                 at = start_of[sort.numbers] + sort.rows - len(self.integrals) + k
-                b.append((np.full(len(at), row + k), at, grid.weights[sort.numbers]))
+                weights = np.ones(len(at)) if terms.is_sum else grid.weights[sort.numbers]
+                b.append((np.full(len(at), row + k), at, weights))
         size = row + len(self.integrals)
 
         def matrix(parts: list[tuple[Any, Any, Any]], width: int) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from osimlite.errors import DocumentError
 from osimlite.files import make_folder, written_atomically
 from osimlite.multibody.spatial import Array
-from osimlite.optimal.layout import KINDS, Layout
+from osimlite.optimal.layout import Layout
 from osimlite.records import dataclass, field
 from osimlite.simulation.files.storage import StoTable, adapter_lines, read_sto
 
@@ -44,14 +44,15 @@ class MocoTrajectory:
         """
         times = w[0] + layout.problem.grid.places * (w[1] - w[0])
         columns: dict[str, Array] = {}
-        for kind in KINDS:
+        # Files of Moco do not have where intervals lead to before states are moved.
+        for kind in (kind for kind in COUNTS if kind in layout.names):
             for number, name in enumerate(layout.names[kind]):
                 places = layout.places_of[kind][:, number]
                 own = w[places[places >= 0]]
                 if len(own) < len(times):
                     own = np.interp(times, np.linspace(times[0], times[-1], len(own)), own)
                 columns[name] = own
-        names = {kind: tuple(layout.names[kind]) for kind in KINDS}
+        names = {kind: tuple(own) for kind, own in layout.names.items() if kind in COUNTS}
         parameters = dict(zip(layout.problem.parameters, w[2 : layout.shared].tolist(), strict=True))
         return cls(times, columns, names, parameters, header or {})
 

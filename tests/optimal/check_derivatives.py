@@ -15,7 +15,7 @@ from osimlite.moco import problem_of, problem_of_inverse, problem_of_track
 from osimlite.optimal.hessian import Hessian
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
-from tests.optimal.small import BODIES, coupled, links, study_of, tables
+from tests.optimal.small import BODIES, coupled, links, study_of, tables, tied
 from tests.optimal.studies import study as moco_study
 
 STEP = 2e-3
@@ -220,17 +220,25 @@ def test_schemes_and_dynamics(scheme, mode, tmp_path):
 
 
 @pytest.mark.parametrize("mode", ["explicit", "implicit"])
-@pytest.mark.parametrize("scheme", [*SCHEMES, "with derivatives"])
-def test_models_with_constraints(scheme, mode, tmp_path):
-    derived = scheme == "with derivatives"
+@pytest.mark.parametrize(
+    ("scheme", "method", "derived"),
+    [
+        *((scheme, "Posa2016", False) for scheme in SCHEMES),
+        ("hermite-simpson", "Posa2016", True),
+        *((scheme, "Bordalba2023", True) for scheme in SCHEMES),
+    ],
+)
+def test_models_with_constraints(scheme, method, derived, mode, tmp_path):
     choices = {
-        "transcription_scheme": "hermite-simpson" if derived else scheme,
+        "transcription_scheme": scheme,
+        "kinematic_constraint_method": method,
         "enforce_constraint_derivatives": derived,
         "minimize_lagrange_multipliers": True,
         "multibody_dynamics_mode": mode,
     }
     load = osimlite.MocoJointReactionGoal(name="load", joint_path="/jointset/j1", weight=1e-3)
-    check(study_of(coupled(links()), load, **choices), tmp_path)
+    model = links("implicit") if scheme == "trapezoidal" else links()
+    check(study_of(tied(coupled(model, "q1")), load, **choices), tmp_path)
 
 
 def test_motions_that_are_given(tmp_path):

@@ -12,15 +12,15 @@ BODIES = "/bodyset/b0", "/bodyset/b1"
 TIMES = np.linspace(0.0, 1.0, 12)
 
 
-def links(*muscles):
-    """Two links on hinges with motors, a marker, two balls above a floor, and muscles of some modes."""
+def links(*muscles, count=2):
+    """Links on hinges with motors, markers, balls above a floor, and muscles of some modes."""
     model = osimlite.Model(name="links")
     inertia, parent = (0.1, 0.2, 0.3, 0.0, 0.0, 0.0), "/ground"
     floor = osimlite.ContactHalfSpace(
         name="floor", socket_frame="/ground", location=(0.0, -0.6, 0.0), orientation=(0.0, 0.0, -np.pi / 2)
     )
     model.add(floor)
-    for k in range(2):
+    for k in range(count):
         body = osimlite.Body(name=f"b{k}", mass=1.0 + k, mass_center=(-0.5, 0.02 * k, 0.01), inertia=inertia)
         model.add(body)
         joint = osimlite.PinJoint(name=f"j{k}", socket_child_frame="offset", socket_parent_frame=parent)
@@ -73,16 +73,23 @@ def links(*muscles):
     return model
 
 
-def coupled(model):
-    """The same, of which the second angle follows from the first, and a point stays at a distance."""
-    model.add(
-        osimlite.CoordinateCouplerConstraint(
-            name="coupler",
-            independent_coordinate_names=("q0",),
-            dependent_coordinate_name="q1",
-            coupled_coordinates_function=osimlite.PolynomialFunction(coefficients=(0.3, 0.5, 0.1)),
+def coupled(model, *coordinates):
+    """The same, of which some angles follow from the first."""
+    for number, name in enumerate(coordinates):
+        function = osimlite.PolynomialFunction(coefficients=(0.3, 0.5 - number, 0.1))
+        model.add(
+            osimlite.CoordinateCouplerConstraint(
+                name=f"coupler{number}",
+                independent_coordinate_names=("q0",),
+                dependent_coordinate_name=name,
+                coupled_coordinates_function=function,
+            )
         )
-    )
+    return model
+
+
+def tied(model):
+    """The same, of which a point stays at a distance."""
     model.add(
         osimlite.ConstantDistanceConstraint(
             name="rope",

@@ -90,7 +90,7 @@ def _pushed():
     ]  # fmt: skip
     goals[1].reaction_weights.objects.append(osimlite.MocoWeight(name="force-x", weight=2.0))
     goals[2].ignore_constrained_coordinates = False
-    return study_of(coupled(links("implicit")), *goals, multibody_dynamics_mode="implicit")
+    return study_of(coupled(links("implicit"), "q1"), *goals, multibody_dynamics_mode="implicit")
 
 
 def project(kind: str, folder: Path) -> Project:

@@ -11,9 +11,11 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+import osimlite
 from osimlite.simulation.files.storage import read_sto, write_sto
 from osimlite.simulation.files.trc import write_trc
 from tests.conftest import ROOT
+from tests.optimal.small import coupled, links
 from tests.optimal.studies import moco_said, study_file
 
 pytestmark = pytest.mark.skipif(find_spec("casadi") is None, reason="needs the casadi package")
@@ -285,6 +287,82 @@ def test_loads(kind, tmp_path):
     loads.cloneAndAppend(force)
     loads.printToXML(str(tmp_path / "loads.xml"))
     theirs, ours = (_said(tmp_path, command) for command in (["-m", "tests.oracle.moco_loads"], ["-c", OUR_LOADS]))
+    assert ours == pytest.approx(theirs, rel=1e-9)
+
+
+OUR_PROJECTION = """
+import json
+import numpy as np
+import osimlite
+from osimlite import moco
+from osimlite.optimal.program import Program
+from osimlite.optimal.ipopt import violations
+program = Program(moco.problem_of("study.omoco"))
+layout, theirs = program.layout, moco.MocoTrajectory.read("theirs.sto")
+w, times = layout.taken(theirs), theirs.times
+# The file has neither where intervals lead to, nor what moves states but as lines over other times than theirs.
+places = layout.places_of["slacks"]
+moved = np.flatnonzero(places[:, 0] >= 0)
+knots = np.linspace(times[0], times[-1], len(moved))
+lines = np.stack([np.interp(times, knots, unit) for unit in np.eye(len(moved))], axis=1)
+for number, name in enumerate(layout.names["slacks"]):
+    w[places[moved, number]] = np.linalg.lstsq(lines, theirs.columns[name], rcond=None)[0]
+count = len(layout.names["projections"])
+of = layout.places_of["projections"][moved]
+for row in range(len(moved)):
+    x = w[layout.places_of["states"][moved[row]]]
+    g = np.array(program.problem.functions.constraints(times[moved[row]], x, 0 * x, [])[3])
+    mu = w[places[moved[row]]].reshape(2, -1)
+    w[of[row]] = x[:count] - (mu @ g).ravel()
+costs, rows = program.values(w)
+study = osimlite.read_document("study.omoco")
+study.solver.optim_hessian_approximation = "exact"
+found = moco.solve(study, guess="theirs.sto")
+terms, slack = dict(zip(program.costs, costs)), float(np.abs(w[places[moved]]).max())
+print(json.dumps([terms, violations(program, w, rows)[0].size, found.success, found.objective, slack]))
+"""
+
+
+@pytest.mark.parametrize(
+    ("scheme", "mode"),
+    [("trapezoidal", "explicit"), ("hermite-simpson", "implicit")],
+)
+def test_states_that_are_moved_onto_constraints(scheme, mode, tmp_path):
+    """By Bordalba 2023: Moco's solution has its costs here and violates nothing, and ours costs no more."""
+    pytest.importorskip("opensim")
+    model = coupled(links(count=3), "q1", "q2")
+    for contact in list(model.components(osimlite.SmoothSphereHalfSpaceForce)):
+        model.remove(contact)
+    osimlite.write(model, tmp_path / "model.osim")
+    commands = ["-m", "tests.oracle.moco_projection", scheme, mode], ["-c", OUR_PROJECTION]
+    theirs, ours = (_said(tmp_path, command) for command in commands)
+    terms, missed, success, objective, slack = ours
+    assert terms == pytest.approx(theirs, rel=1e-9)
+    assert missed < 1e-6 < slack
+    assert success
+    assert objective <= sum(theirs.values()) * (1.0 + 1e-4)
+
+
+SCALED = """
+import opensim as osim
+from tests.oracle.moco_studies import ended
+study = osim.MocoStudy("squat-25.omoco")
+solver = osim.MocoCasADiSolver.safeDownCast(study.updSolver())
+solver.set_scale_variables_using_bounds(True)
+solver.set_minimize_lagrange_multipliers(True)
+solver.set_multibody_dynamics_mode("implicit")
+solver.set_minimize_implicit_multibody_accelerations(True)
+solver.set_optim_max_iterations(2)
+ended(study)
+"""
+
+
+def test_costs_of_scaled_variables(tmp_path):
+    """After two of its iterations Moco's costs of multipliers and accelerations are those that are found here."""
+    pytest.importorskip("opensim")
+    study_file(tmp_path, "squat-25")
+    theirs, ours = (_said(tmp_path, ["-c", code]) for code in (SCALED, OUR_LOADS))
+    assert {"multipliers", "accelerations"} < theirs.keys()
     assert ours == pytest.approx(theirs, rel=1e-9)
 
 
