@@ -12,23 +12,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from math import hypot
-from typing import NamedTuple
 
 Point = tuple[float, float, float]
 """x, y, and the slope there."""
 Numbers = tuple[float, ...]
 """Those of a curve."""
-
-
-class Rising(NamedTuple):
-    """Coefficients of a polynomial, from u on."""
-
-    one: float
-    two: float
-    three: float
-    four: float
-    five: float
-
+Rising = tuple[float, float, float, float, float]
+"""Coefficients of a polynomial, from u on."""
 
 SECTIONS, FIRST, LAST = 0, 1, 4
 HEAD = 7
@@ -116,18 +106,16 @@ def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
     if x > c[LAST]:
         return c[LAST + 1] + c[LAST + 2] * (x - c[LAST]), c[LAST + 2]
     k, u = place_on(c, x)
-    return on_section(u, _rising(c, k + X), c[k + Y], _rising(c, k + Y + 1))
-
-
-def _rising(c: Sequence[float], k: int) -> Rising:
-    return Rising(c[k], c[k + 1], c[k + 2], c[k + 3], c[k + 4])
+    p, q = k + X, k + Y
+    of_x = c[p], c[p + 1], c[p + 2], c[p + 3], c[p + 4]
+    return on_section(u, of_x, c[q], (c[q + 1], c[q + 2], c[q + 3], c[q + 4], c[q + 5]))
 
 
 def place_on(c: Sequence[float], x: float) -> tuple[int, float]:
     """The section of a curve that has x, by the place of its numbers, and u there: the root is unique."""
-    k = section_with(c, x)
-    rest = x - c[k + START]
-    u, of_x = first_place(c, k, rest), _rising(c, k + X)
+    k, rest, u = first_place(c, x)
+    p = k + X
+    of_x = c[p], c[p + 1], c[p + 2], c[p + 3], c[p + 4]
     for _ in range(ROUNDS):
         u, goes_on = nearer_place(u, rest, of_x)
         if not goes_on:
@@ -135,22 +123,20 @@ def place_on(c: Sequence[float], x: float) -> tuple[int, float]:
     return k, u
 
 
-def section_with(c: Sequence[float], x: float) -> int:
-    """The section of a curve that has x, by the place of its numbers."""
+def first_place(c: Sequence[float], x: float) -> tuple[int, float, float]:
+    """The section that has x, how far that is from its first end, and u to begin the search from."""
     count, number = int(c[SECTIONS]), 0
     while number < count - 1 and x >= c[HEAD + number]:
         number += 1
-    return HEAD + count + SECTION * number
-
-
-def first_place(c: Sequence[float], k: int, rest: float) -> float:
-    """Where the search begins for the place that is so far in x from the first end of a section."""
+    k = HEAD + count + SECTION * number
+    rest = x - c[k + START]
     part = rest * c[k + SCALE]
     node = min(int(part), NODES - 1)
     part -= node
     s = k + STARTS + 2 * node
     u0, d0, u1, d1 = c[s], c[s + 1], c[s + 2], c[s + 3]
-    return u0 + part * (d0 + part * (3.0 * (u1 - u0) - 2.0 * d0 - d1 + part * (2.0 * (u0 - u1) + d0 + d1)))
+    u = u0 + part * (d0 + part * (3.0 * (u1 - u0) - 2.0 * d0 - d1 + part * (2.0 * (u0 - u1) + d0 + d1)))
+    return k, rest, u
 
 
 def nearer_place(u: float, rest: float, of_x: Rising) -> tuple[float, bool]:

@@ -8,18 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from osimlite.forces.bezier import (
-    FIRST,
-    LAST,
-    ROUNDS,
-    START,
-    Rising,
-    X,
-    first_place,
-    nearer_place,
-    on_section,
-    section_with,
-)
+from osimlite.forces.bezier import FIRST, LAST, ROUNDS, Rising, X, first_place, nearer_place, on_section
 from osimlite.simulation.kernels.pointers import Floats, at
 
 LANES = 64
@@ -41,9 +30,8 @@ def ask(x: Floats, room: Floats, number: int, place: int, z: float) -> None:
         lane[LANES * INSIDE] = lane[LANES * REST] = lane[LANES * U] = 0.0
         lane[LANES * OF_X] = 1.0
         return
-    section = section_with(c, z)
-    rest = z - c[section + START]
-    lane[LANES * INSIDE], lane[LANES * REST], lane[LANES * U] = 1.0, rest, first_place(c, section, rest)
+    section, lane[LANES * REST], lane[LANES * U] = first_place(c, z)
+    lane[LANES * INSIDE] = 1.0
     for k in range(11):
         lane[LANES * (OF_X + k)] = c[section + X + k]
 
@@ -82,7 +70,7 @@ def answer(room: Floats, asked: int) -> None:
 
 def rising(lane: Floats, row: int) -> Rising:
     """Coefficients of a lane."""
-    return Rising(
+    return (
         lane[LANES * row],
         lane[LANES * (row + 1)],
         lane[LANES * (row + 2)],
