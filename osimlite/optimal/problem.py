@@ -77,6 +77,8 @@ class Problem(Asked):
         self.study = study
         self.phase = study.problem.phases
         self.series: list[Series] = []
+        # What programs on other meshes share, by whether it is of points of the mesh.
+        self.formulas: dict[bool, Any] = {}
         if not isinstance(study.solver, MocoCasADiSolver):
             raise self.refused(study.solver, "of solvers only MocoCasADiSolver is known")
         self.solver: MocoCasADiSolver = study.solver
