@@ -2,6 +2,8 @@
 
     python benchmarks/optimal.py [STUDY ...]
 
+``benchmarks/refinement.py`` shows what meshes save that are refined where it is needed.
+
 Each study is solved in a process of its own; seconds are those of the processor, with importing and making of all.
 """
 

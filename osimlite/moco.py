@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from osimlite.optimal.inverse import problem_of_inverse as problem_of_inverse
     from osimlite.optimal.ipopt import Progress as Progress
     from osimlite.optimal.ipopt import Violation as Violation
+    from osimlite.optimal.refinement import Refinement as Refinement
     from osimlite.optimal.solution import MocoSolution as MocoSolution
     from osimlite.optimal.solution import evaluated as evaluated
     from osimlite.optimal.solution import problem_of as problem_of
@@ -27,6 +28,7 @@ _MODULES = {
     "MocoSolution": "osimlite.optimal.solution",
     "MocoTrajectory": "osimlite.optimal.trajectory",
     "Progress": "osimlite.optimal.ipopt",
+    "Refinement": "osimlite.optimal.refinement",
     "Violation": "osimlite.optimal.ipopt",
     "inverse": "osimlite.optimal.inverse",
     "problem_of_inverse": "osimlite.optimal.inverse",

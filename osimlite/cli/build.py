@@ -35,7 +35,8 @@ def build(
 ) -> None:
     """Make a built-in model, or one of yours in Python, YAML or JSON, and write its .osim file.
 
-    The model is validated first: nothing is written if it has an error.
+    The model is validated first: nothing is written if it has an error. Beside human-walks its study of Moco is written
+    (.omoco, with a guess), which 'osimlite run' solves.
 
     Example: osimlite build dynamic-walker -p thigh_length=0.42 -o walker.osim
     """
@@ -43,7 +44,7 @@ def build(
     from osimlite.document.printer import to_text, write
     from osimlite.errors import OsimliteError
     from osimlite.lint import validate
-    from osimlite.models.source import make_model
+    from osimlite.models.source import make_model, write_beside
     from osimlite.text import counted
 
     if list_models:
@@ -69,6 +70,8 @@ def build(
     warned = len(report.warnings)
     advice = f"; {counted(warned, 'warning')}: see osimlite validate {target}" if warned else ""
     say(f"{target}: {count} components{advice}")
+    for path in write_beside(source, model, target):
+        say(f"wrote {path}")
 
 
 def _list_models() -> None:

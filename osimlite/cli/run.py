@@ -39,6 +39,16 @@ def run(
         Path | None,
         Option("--report", metavar="FILE.html", help="Show it all on one page.", show_default=False),
     ] = None,
+    refine: Annotated[
+        str | None,
+        Option(
+            "--refine",
+            metavar="TOL[:HESSIAN]",
+            help="Of one study of Moco: split intervals of the mesh until the error of none is above this, with second "
+            "derivatives that are exact or limited-memory.",
+            show_default=False,
+        ),
+    ] = None,
     as_json: Annotated[bool, Option("--json", help="Print what became of each setup as JSON.")] = False,
 ) -> None:
     """Run setup files of OpenSim's tools, and write the files that OpenSim would write.
@@ -48,6 +58,8 @@ def run(
 
     Of several setups each waits for those that make what it names; one that fails stops no other. What is done is noted
     until all are, and --resume goes on after Ctrl-C, a crash or an error. With -o each has a folder of its own in it.
+
+    With --report what a study of Moco finds is simulated, too, and it is told how far the motion stays with it.
 
     Exits with 0 if all is done, 1 if the answer of a tool is no, 2 if a setup could not be run.
 
@@ -68,9 +80,11 @@ def run(
             raise SettingError(f"--report would replace '{report}', which the results come from; give it another name")
         workers = 1
     if len(files) == 1 and not as_json and not (resume or cluster):
-        outcome = _run_alone(files[0], output)
+        outcome = _run_alone(files[0], output, refine, simulates=report is not None)
         _write_report({files[0]: outcome}, report)
         raise SystemExit(0 if outcome.done else 1)
+    if refine is not None:
+        raise SettingError("--refine takes one study; leave out the others, --json, --resume and --cluster")
     kept: dict[str | Path, Outcome] | None = None if report is None else {}
     count = 1 if workers is None and cluster is None and len(files) < WORTH_SHARING else workers
     with progress_bar("running", len(files)) as progress:
@@ -102,7 +116,7 @@ def _codes(trials: list[Trial]) -> list[int]:
     return [{DONE: 0, NO: 1}.get(trial.status, 2) for trial in trials]
 
 
-def _run_alone(setup: Path, output: Path | None) -> Outcome:
+def _run_alone(setup: Path, output: Path | None, refine: str | None, *, simulates: bool) -> Outcome:
     """Run a setup, and say what came out."""
     from osimlite.cli._console import say
     from osimlite.lint.diagnostic import Report
@@ -110,7 +124,14 @@ def _run_alone(setup: Path, output: Path | None) -> Outcome:
     from osimlite.tools.running import run as run_setup
 
     try:
-        outcome = run_setup(setup, output, tell=_show_findings, progress=lambda line: say(line, err=True))
+        outcome = run_setup(
+            setup,
+            output,
+            tell=_show_findings,
+            progress=lambda line: say(line, err=True),
+            refine=refine,
+            simulates=simulates,
+        )
     except FaultySetup as fault:
         _show_findings(Report(fault.report.errors, fault.report.texts))
         raise

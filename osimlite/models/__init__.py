@@ -9,5 +9,8 @@ BUILT_IN = {
     "human-walker": "osimlite.models.walkers:human_walker",
     "human": "osimlite.models.walking:human",
     "jumper": "osimlite.models.jumper:jumper",
+    "human-walks": "osimlite.models.predicted_walk:human_walks",
 }
 """Name on the command line, and where the function is that makes the model."""
+STUDIES = {"human-walks": "osimlite.models.predicted_walk:write_study"}
+"""Where the function is that writes what belongs to a model beside its file."""

@@ -12,7 +12,7 @@ from typing import Any, get_type_hints
 from osimlite._load import errors_placed, imports_beside, module_named, module_of_file
 from osimlite.document.data import SUFFIXES, read_data
 from osimlite.errors import OsimliteError
-from osimlite.models import BUILT_IN
+from osimlite.models import BUILT_IN, STUDIES
 from osimlite.schema.model import Model
 from osimlite.text import did_you_mean, listed
 
@@ -42,6 +42,19 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
     if not isinstance(model, Model):
         raise OsimliteError(f"'{source}' returned a {type(model).__name__}, not an osimlite.Model")
     return model
+
+
+def write_beside(source: str, model: Model, file: Path) -> list[Path]:
+    """Write what belongs to a built-in model beside its file, such as a study; the files.
+
+    Raises:
+        OsimliteError: it cannot be written.
+    """
+    if source not in STUDIES:
+        return []
+    place, _, name = STUDIES[source].partition(":")
+    files: list[Path] = getattr(module_named(place), name)(model, file)
+    return files
 
 
 def parameters_of(source: str) -> dict[str, Any]:

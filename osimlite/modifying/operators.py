@@ -242,7 +242,7 @@ def _function_paths(model: Model, operator: p.ModOpReplacePathsWithFunctionBased
 
 
 def put_paths(model: Model, paths: Any) -> None:
-    """Give forces other paths, each with the path of its force as its name.
+    """Give forces other paths, each of which has the path of its force as its name so far.
 
     Raises:
         ModelError: there is no such force, or it has no path.
@@ -253,6 +253,7 @@ def put_paths(model: Model, paths: Any) -> None:
         if force is None or not hasattr(force, "geometry_path"):
             raise ModelError(f"the model has no force with a path '{path.name}'{did_you_mean(path.name, [*forces])}")
         force.geometry_path = path.copy_deep()
+        force.geometry_path.name = "path"
 
 
 @operation(p.ModOpAddExternalLoads)

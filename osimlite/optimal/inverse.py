@@ -15,6 +15,7 @@ from osimlite.optimal.given_motion import GivenMotion
 from osimlite.optimal.ipopt import Progress
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
+from osimlite.optimal.refinement import Refinement
 from osimlite.optimal.solution import MocoSolution, solved
 from osimlite.optimal.tables import Curves, expect_columns, processed_table
 from osimlite.optimal.tool_study import set_times, study_of
@@ -92,6 +93,7 @@ def inverse(
     folder: str | Path | None = None,
     more: Callable[[MocoStudy], None] | None = None,
     tell: Callable[[Progress], None] | None = None,
+    refine: float | str | Refinement | None = None,
 ) -> MocoSolution:
     """Find what muscles do in a motion that is given, as OpenSim's MocoInverse.
 
@@ -100,17 +102,21 @@ def inverse(
         folder: that their files are in; the current folder if None.
         more: changes the study before it is solved: goals, bounds, settings of the solver.
         tell: is told of each iteration.
+        refine: as of :func:`osimlite.moco.solve`.
 
     Raises:
         OsimliteError: as of :func:`problem_of_inverse`.
     """
-    return solved_inverse(problem_of_inverse(tool, None, None if folder is None else Path(folder), more), tell)
+    problem = problem_of_inverse(tool, None, None if folder is None else Path(folder), more)
+    return solved_inverse(problem, tell, refine)
 
 
-def solved_inverse(problem: Problem, tell: Callable[[Progress], None] | None) -> MocoSolution:
+def solved_inverse(
+    problem: Problem, tell: Callable[[Progress], None] | None, refine: float | str | Refinement | None = None
+) -> MocoSolution:
     """The solution of the problem of the tool, with the values and speeds of the motion that was given."""
     given: GivenMotion = problem.functions
-    solution = solved(Program(problem), None, tell)
+    solution = solved(Program(problem), None, tell, refine)
     trajectory = solution.trajectory
     states = given.inserted(trajectory.times)
     names = trajectory.names | {"states": (*states, *trajectory.names["states"])}

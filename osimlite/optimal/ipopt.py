@@ -24,6 +24,10 @@ NEAR = 1e-4
 """Of two iterates that violate nothing by more than this the cheaper one is the better."""
 
 
+NEARLY = {"mu_init": 1e-7, "bound_push": 1e-8, "bound_frac": 1e-8}
+"""Of a search that starts near its end: what its barrier costs is no more than the barrier times the bounds."""
+
+
 @dataclass(frozen=True)
 class Violation:
     """A constraint that is not fulfilled.
@@ -102,7 +106,9 @@ def violations(program: Program, w: Array, rows: Array | None = None, most: int 
     return result
 
 
-def solve(program: Program, guess: Array, tell: Callable[[Progress], None] | None = None) -> Found:
+def solve(
+    program: Program, guess: Array, tell: Callable[[Progress], None] | None = None, *, near: bool = False
+) -> Found:
     """Look for the least objective from a guess.
 
     An interrupt (Ctrl-C) ends the search, and the best that was found is what comes out.
@@ -111,11 +117,12 @@ def solve(program: Program, guess: Array, tell: Callable[[Progress], None] | Non
         program: that is solved.
         guess: to start from.
         tell: is told of each iteration.
+        near: whether the guess is nearly a solution, so that it is not moved away from its bounds.
     """
     settings = program.problem.solver
     search = _Search(program, tell)
     options = {
-        "ipopt": _options(program) | {"print_level": 0, "sb": "yes"},
+        "ipopt": _options(program) | (NEARLY if near else {}) | {"print_level": 0, "sb": "yes"},
         "print_time": False,
         "show_eval_warnings": False,
         "no_nlp_grad": True,

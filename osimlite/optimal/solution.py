@@ -14,6 +14,8 @@ from osimlite.optimal.ipopt import Progress, Violation, violations
 from osimlite.optimal.ipopt import solve as search
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
+from osimlite.optimal.refinement import Refinement, Round, refined
+from osimlite.optimal.stride import stride
 from osimlite.optimal.trajectory import MocoTrajectory
 from osimlite.records import dataclass
 from osimlite.schema.moco.studies import MocoStudy
@@ -31,8 +33,10 @@ class MocoSolution:
         objective: what was made small.
         terms: the parts of it, by the names of the goals.
         violations: the largest of what is not fulfilled, the largest first.
-        iterations: that were taken.
+        iterations: that were taken, on all meshes.
         duration: of the search, s.
+        rounds: what was done on each mesh, and the largest error of its intervals; empty if none was refined.
+        stride: the motion and what follows it, if a MocoPeriodicityGoal says that; None otherwise.
     """
 
     trajectory: MocoTrajectory
@@ -43,6 +47,8 @@ class MocoSolution:
     violations: list[Violation]
     iterations: int
     duration: float
+    rounds: tuple[Round, ...] = ()
+    stride: MocoTrajectory | None = None
 
     @property
     def states(self) -> StoTable:
@@ -74,6 +80,7 @@ def solve(
     guess: str | Path | MocoTrajectory | None = None,
     folder: str | Path | None = None,
     tell: Callable[[Progress], None] | None = None,
+    refine: float | str | Refinement | None = None,
 ) -> MocoSolution:
     """Solve a study of Moco: the same nonlinear program as Moco's, with exact derivatives.
 
@@ -82,6 +89,8 @@ def solve(
         guess: to start from, in place of the study's; without either the middle between the bounds of each variable.
         folder: that the files are in which a study names that is in no file; the current folder if None.
         tell: is told of each iteration. Ctrl-C ends the search, and the best so far is what comes out.
+        refine: split intervals of the mesh until the error of none is above this, see :class:`Refinement`; None for
+            the mesh as it is.
 
     Returns:
         What came out; `success` says whether it is a solution, and `violations` what is not fulfilled otherwise.
@@ -91,7 +100,7 @@ def solve(
         OsimliteError: the study cannot be read, or is none.
     """
     with in_file(study):
-        return solved(Program(problem_of(study, folder)), guess, tell)
+        return solved(Program(problem_of(study, folder)), guess, tell, refine)
 
 
 def problem_of(study: str | Path | MocoStudy, folder: str | Path | None = None) -> Problem:
@@ -112,34 +121,46 @@ def problem_of(study: str | Path | MocoStudy, folder: str | Path | None = None) 
 
 
 def solved(
-    program: Program, guess: str | Path | MocoTrajectory | None, tell: Callable[[Progress], None] | None
+    program: Program,
+    guess: str | Path | MocoTrajectory | None,
+    tell: Callable[[Progress], None] | None,
+    refine: float | str | Refinement | None = None,
 ) -> MocoSolution:
     """The solution of a nonlinear program; as :func:`solve`."""
-    problem, layout = program.problem, program.layout
+    problem, rounds = program.problem, list[Round]()
     if guess is None and problem.solver.guess_file.strip():
         guess = problem.place(problem.solver.guess_file)
     if isinstance(guess, str | Path):
         guess = MocoTrajectory.read(guess)
-    found = search(program, layout.guess() if guess is None else layout.taken(guess), tell)
+    start = program.layout.guess() if guess is None else program.layout.taken(guess)
+    if refine is None:
+        found = search(program, start, tell)
+    else:
+        program, found, rounds = refined(program, start, Refinement.of(refine), tell)
+    iterations = sum(each.iterations for each in rounds) or found.iterations
+    duration = sum(each.duration for each in rounds) or found.duration
     costs, rows = program.values(found.w)
     terms = dict(zip(program.costs, costs.tolist(), strict=True))
     header = {
-        "num_iterations": str(found.iterations),
+        "num_iterations": str(iterations),
         "objective": f"{costs.sum():.6f}",
         **{f"objective_{name}": f"{cost:.6f}" for name, cost in terms.items()},
-        "solver_duration": f"{found.duration:.6f}",
+        "solver_duration": f"{duration:.6f}",
         "status": found.status,
         "success": "true" if found.success else "false",
     }
+    trajectory = MocoTrajectory.of(program.layout, found.w, header)
     return MocoSolution(
-        trajectory=MocoTrajectory.of(layout, found.w, header),
+        trajectory=trajectory,
         success=found.success,
         status=found.status,
         objective=float(costs.sum()),
         terms=terms,
         violations=violations(program, found.w, rows),
-        iterations=found.iterations,
-        duration=found.duration,
+        iterations=iterations,
+        duration=duration,
+        rounds=tuple(rounds),
+        stride=stride(problem, trajectory),
     )
 
 

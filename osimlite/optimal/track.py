@@ -12,6 +12,7 @@ from osimlite.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.optimal.ipopt import Progress
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
+from osimlite.optimal.refinement import Refinement
 from osimlite.optimal.solution import MocoSolution, solved
 from osimlite.optimal.tables import processed_table
 from osimlite.optimal.tool_study import set_times, study_of
@@ -111,6 +112,7 @@ def track(
     folder: str | Path | None = None,
     more: Callable[[MocoStudy], None] | None = None,
     tell: Callable[[Progress], None] | None = None,
+    refine: float | str | Refinement | None = None,
 ) -> MocoSolution:
     """Find a motion that follows measured states, as OpenSim's MocoTrack.
 
@@ -119,12 +121,13 @@ def track(
         folder: that their files are in; the current folder if None.
         more: changes the study before it is solved: goals, bounds, settings of the solver.
         tell: is told of each iteration.
+        refine: as of :func:`osimlite.moco.solve`.
 
     Raises:
         OsimliteError: as of :func:`problem_of_track`.
     """
     problem, guess = problem_of_track(tool, None, None if folder is None else Path(folder), more)
-    return solved(Program(problem), guess, tell)
+    return solved(Program(problem), guess, tell, refine)
 
 
 def _marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:

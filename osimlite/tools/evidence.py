@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,10 +13,11 @@ from osimlite.document.part import read_object
 from osimlite.errors import OsimliteError
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.records import dataclass, field
 from osimlite.schema.model import Model
 from osimlite.schema.prescribed import ExternalLoads
 from osimlite.simulation.elements.external_loads import loads_table
+from osimlite.simulation.files.storage import StoTable
 
 ON_GROUND = 20.0
 """A foot that is pushed up by more stands, N."""
@@ -41,6 +42,11 @@ class Evidence:
     sensors: Sequence[str] = ()  # names of the k sensors that were fitted
     # how far they are turned from where they were measured (t, k), rad; NaN where one was not
     angles: Array | None = None
+    # of a motion that goes by its own muscles and contacts: the generalized speeds (t, n), other states by their paths,
+    # and the controls, with NaN where there are none
+    speeds: Array | None = None
+    states: Mapping[str, Array] = field(default_factory=dict)
+    controls: StoTable | None = None
 
     @classmethod
     def of(cls, model: Model, file: Path, mechanism: Mechanism, times: Array, values: Array, **more: Any) -> Evidence:

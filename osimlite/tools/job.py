@@ -24,6 +24,8 @@ class Job:
     setup: Any  # what the document says
     file: Path  # the document
     output: Path | None = None  # folder for all results, in place of those that the setup names
+    refine: float | str | None = None  # to what error meshes of optimal control are refined, if they are
+    simulates: bool = False  # whether what optimal control finds is simulated, too
 
     def error(self, message: str) -> DocumentError:
         """An error of the setup."""

@@ -16,6 +16,7 @@ def run(job: Job, outcome: Outcome) -> None:
     if job.setup.output_paths:
         message = "output_paths is given, and outputs of the solution are not computed here; leave it empty"
         raise NotRunnable(message, file=str(job.file))
-    solution = solved_inverse(problem_of_inverse(job.setup, job.file), telling(outcome))
+    problem = problem_of_inverse(job.setup, job.file)
+    solution = solved_inverse(problem, telling(outcome), job.refine)
     outcome.new_table(job.result(f"{job.setup.name or 'MocoInverse'}_solution.sto"), solution.trajectory.table())
-    report(solution, outcome)
+    report(job, problem, solution, outcome)

@@ -15,10 +15,10 @@ def run(job: Job, outcome: Outcome) -> None:
     from osimlite.optimal.track import problem_of_track
 
     problem, guess = problem_of_track(job.setup, job.file)
-    solution = solved(Program(problem), guess, telling(outcome))
+    solution = solved(Program(problem), guess, telling(outcome), job.refine)
     name = job.setup.name or "MocoTrack"
     for goal, what in (("state_tracking", "states"), ("marker_tracking", "markers")):
         if goal in problem.tables:
             outcome.new_table(job.result(f"{name}_tracked_{what}.sto"), problem.tables[goal])
     outcome.new_table(job.result(f"{name}_solution.sto"), solution.trajectory.table())
-    report(solution, outcome)
+    report(job, problem, solution, outcome)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from osimlite._load import module_name
 from osimlite.document.reader import collector_paused, read_any
-from osimlite.errors import DocumentError, MissingFileError, OsimliteError
+from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
 from osimlite.files import from_folder
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report, merged
@@ -53,6 +53,8 @@ def run(
     check: bool = True,
     tell: Callable[[Report], None] | None = None,
     progress: Callable[[str], None] | None = None,
+    refine: float | str | None = None,
+    simulates: bool = False,
 ) -> Outcome:
     """Run the setup of a tool as OpenSim would, and write the files that it would write.
 
@@ -63,6 +65,10 @@ def run(
         tell: is told, before anything is computed, what is misspelt although the tool runs with it, such as a marker
             or a sensor that is left out then, or the units of a table.
         progress: is told, line by line, how far a long search has come.
+        refine: of optimal control, split intervals of the mesh until the error of none is above this; see
+            :func:`osimlite.moco.solve`.
+        simulates: of optimal control, whether the model is also simulated with the controls that were found, and it is
+            told how far that is from what was found.
 
     Returns:
         The tables that were written, as they were before they were rounded to the digits of the files, and a summary.
@@ -79,6 +85,8 @@ def run(
     tag = type(top).__name__
     if not _is_there(tag):
         raise NotRunnable(f"setups of {tag} cannot be run; those of {listed(runnable())} can", file=str(file))
+    if refine is not None and not tag.startswith("Moco"):
+        raise SettingError(f"a {tag} has no mesh to refine; leave out --refine")
     outcome = Outcome(progress=progress)
     if check:
         away: dict[str, None] = {}
@@ -93,7 +101,7 @@ def run(
             tell(Report(misspelt, report.texts))
     tool = import_module(f"{__package__}.{module_name(tag)}")
     try:
-        tool.run(Job(top, file, None if output is None else Path(output)), outcome)
+        tool.run(Job(top, file, None if output is None else Path(output), refine, simulates), outcome)
         outcome.write(file)
     except OsimliteError as error:
         error.file = error.file or str(file)

@@ -16,6 +16,7 @@ from osimlite.errors import OsimliteError
 from osimlite.files import write_atomically
 from osimlite.fitting.fitted_motion import ADVICE
 from osimlite.multibody import build_mechanism
+from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.records import replace
 from osimlite.text import listed
@@ -24,8 +25,9 @@ from osimlite.tools.outcome import DYNAMICS, Outcome
 from osimlite.tools.trials.check import check_trial
 from osimlite.tools.trials.folder import SETUPS
 from osimlite.view.lettering import plain_lettering
+from osimlite.view.motion import contact_forces
 from osimlite.view.plots import COLORS, STYLES, figure_of
-from osimlite.view.recording import MeasuredMarkers, Recording
+from osimlite.view.recording import MeasuredMarkers, Recording, computed_forces
 from osimlite.view.shown import Shown
 
 SIDES = {"r": (COLORS[0], "right"), "l": (COLORS[1], "left"), "": ("#444444", "")}
@@ -35,6 +37,8 @@ STILL = 1e-4
 """An angle that changes by less (rad) does not move."""
 WORST = 12
 """So many markers are shown by name."""
+NOT_PUSHED = "HalfSpace", "ground"
+"""What stands still, of both that a contact pushes."""
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1d2733; background: #fff; max-width: 1120px; margin: 0 auto;
   padding: 0 20px 60px }
@@ -132,6 +136,8 @@ def _parts(trials: Sequence[Trial]) -> Iterator[str]:
     shown = [trial for trial in trials if trial.evidence is not None]
     yield from _section("Joint angles", _angles(shown))
     yield from _section("Joint moments", _moments(shown))
+    yield from _section("Controls", _controls(shown))
+    yield from _section("Contact forces", _contacts(shown))
     for trial in shown:
         name = f": {trial.name}" if len(shown) > 1 else ""
         yield from _residuals(trial, name)
@@ -172,14 +178,25 @@ def _viewer(evidence: Evidence) -> str:
         names = [evidence.markers[place] for place in known]
         stations = [(own[name].body, np.asarray(own[name].location)) for name in names]
         measured = MeasuredMarkers(names, stations, evidence.measured[:, known])
-    motion = Recording(
-        evidence.times, evidence.coordinates, evidence.values, np.zeros_like(evidence.values), measured=measured
-    )
+    motion = _motion(evidence, mechanism, measured)
     shown = Shown.of(evidence.model, mechanism, file=evidence.file, motion=motion)
     # Nobody mends the model here.
     page = replace(shown, findings=()).page_text().replace("</style>", f"{PLAIN}</style>", 1)
     note = "Green: as measured; pink: of the model." if measured else ""
     return f'<iframe srcdoc="{html.escape(page)}" title="the motion"></iframe><p class="note">{note}</p>'
+
+
+def _motion(evidence: Evidence, mechanism: Mechanism, measured: MeasuredMarkers | None = None) -> Recording:
+    """With the forces of its contacts, if it has speeds."""
+    speeds, forces = evidence.speeds, dict[str, Array]()
+    if speeds is None:
+        speeds = np.zeros_like(evidence.values)
+    else:
+        folder = evidence.file.parent
+        forces = computed_forces(evidence.model, mechanism, evidence.times, evidence.values, speeds, folder)
+    return Recording(
+        evidence.times, evidence.coordinates, evidence.values, speeds, forces, evidence.states, measured=measured
+    )
 
 
 def _angles(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
@@ -214,6 +231,42 @@ def _moments(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
                     unit = "N m" if kind == "moment" else "N"
                     line = _Line(table.times, table[label], side, STYLES[number % 3], trial.name, trial.steps)
                     panels.setdefault(f"{stem} ({unit})", []).append(line)
+    return panels
+
+
+def _controls(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
+    """Lines by control without its side."""
+    panels: dict[str, list[_Line]] = {}
+    for number, trial in enumerate(trials):
+        evidence = trial.evidence
+        if evidence is None or evidence.controls is None:
+            continue
+        for label in evidence.controls.columns:
+            stem, side = side_of(label.rpartition("/")[2])
+            column, times = evidence.controls[label], evidence.controls.times
+            known = np.isfinite(column)
+            line = _Line(times[known], column[known], side, STYLES[number % 3], trial.name, {})
+            panels.setdefault(stem, []).append(line)
+    return panels
+
+
+def _contacts(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
+    """Lines by axis of what pushes each side."""
+    panels: dict[str, list[_Line]] = {}
+    for number, trial in enumerate(trials):
+        evidence = trial.evidence
+        if evidence is None or evidence.speeds is None:
+            continue
+        sums: dict[str, Array] = {}
+        for force in contact_forces(_motion(evidence, build_mechanism(evidence.model))):
+            if force.frame not in NOT_PUSHED:
+                side = side_of(force.element)[1]
+                sums[side] = sums.get(side, 0.0) + force.vectors
+        for axis, name in enumerate("xyz"):
+            for side, vectors in sums.items():
+                if np.ptp(vectors[:, axis]) > 0.0:
+                    line = _Line(evidence.times, vectors[:, axis], side, STYLES[number % 3], trial.name, {})
+                    panels.setdefault(f"along {name} (N)", []).append(line)
     return panels
 
 

@@ -1,0 +1,239 @@
+"""Meshes that are as fine as a motion needs: the error of each interval is estimated, and where it is large they split.
+
+After J. T. Betts, Practical Methods for Optimal Control, 2010, section 4.7: within an interval the states are the
+polynomial that the scheme stands for, and what their rates are off there from the equations of motion is the error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+from math import inf
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from osimlite.errors import SettingError
+from osimlite.multibody.spatial import Array
+from osimlite.optimal.ipopt import Found, Progress
+from osimlite.optimal.ipopt import solve as search
+from osimlite.optimal.layout import KINDS
+from osimlite.optimal.problem import Problem
+from osimlite.optimal.program import Program
+from osimlite.optimal.schemes import Grid
+from osimlite.records import dataclass
+from osimlite.text import or_known
+
+SAMPLES, WEIGHTS = (0.5 * part for part in np.polynomial.legendre.leggauss(4))
+SAMPLES = SAMPLES + 0.5
+"""Where in an interval (0 to 1) the error is looked at, and how much each counts in the mean."""
+MOST_PARTS = 4
+"""So many an interval becomes at most at once."""
+MOST_ROUNDS, MOST_INTERVALS = 10, 2000
+"""Of meshes, and of intervals of one, more are not tried."""
+HESSIANS = "exact", "limited-memory"
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How fine a mesh becomes.
+
+    Attributes:
+        tolerance: of the error of a state within an interval, over one more than the largest size of that state.
+        hessian: second derivatives of all searches but the first: "exact" or "limited-memory".
+    """
+
+    tolerance: float
+    hessian: str = "exact"
+
+    @classmethod
+    def of(cls, given: float | str | Refinement) -> Refinement:
+        """Of a tolerance, or of words such as ``1e-3`` and ``1e-3:limited-memory``.
+
+        Raises:
+            SettingError: they say something else.
+        """
+        if isinstance(given, Refinement):
+            return given
+        text, _, hessian = str(given).partition(":")
+        try:
+            result = cls(float(text), hessian or "exact")
+        except ValueError:
+            raise SettingError(f"a mesh is refined to a tolerance such as 1e-3, not '{text}'") from None
+        if not 0.0 < result.tolerance < inf:
+            raise SettingError(f"a mesh is refined to a tolerance above 0, not {text}")
+        if result.hessian not in HESSIANS:
+            raise SettingError(f"meshes are not refined with '{hessian}'{or_known(hessian, HESSIANS)}")
+        return result
+
+
+class Round(NamedTuple):
+    """The search on one mesh."""
+
+    intervals: int
+    error: float  # the largest of an interval
+    objective: float
+    iterations: int
+    duration: float  # s
+
+    def __str__(self) -> str:
+        steps = f"{self.iterations} iterations in {self.duration:.3g} s"
+        return f"{self.intervals} intervals, error {self.error:.2g}, objective {self.objective:.8g}; {steps}"
+
+
+def refined(
+    program: Program, guess: Array, refinement: Refinement, tell: Callable[[Progress], None] | None = None
+) -> tuple[Program, Found, list[Round]]:
+    """Solve on finer and finer meshes, each from the solution before, until no interval's error is above the tolerance.
+
+    A mesh that cannot be solved ends it, and so do too many intervals or meshes.
+
+    Args:
+        program: of the first mesh.
+        guess: to start from.
+        refinement: how far.
+        tell: is told of each iteration.
+
+    Returns:
+        The program of the last mesh, its solution, and what was done.
+
+    Raises:
+        UnsupportedError: rates are variables, of which no error is known; or a setting is not done.
+    """
+    refuse(program.problem)
+    found = search(program, guess, tell)
+    rounds: list[Round] = []
+    while True:
+        error = errors(program, found.w)
+        cost = float(program.values(found.w)[0].sum())
+        rounds.append(Round(len(error), float(error.max()), cost, found.iterations, found.duration))
+        mesh = split(program.problem.grid, error, refinement.tolerance)
+        is_good, is_enough = len(mesh) == len(error) + 1, len(rounds) > MOST_ROUNDS or len(mesh) > MOST_INTERVALS
+        if not found.success or is_good or is_enough:
+            return program, found, rounds
+        finer = _on(program.problem, mesh, refinement.hessian)
+        guess, program = carried(program, found.w, finer), finer
+        found = search(program, guess, tell, near=True)
+
+
+def refuse(problem: Problem) -> None:
+    """Refuse what has no error here.
+
+    Raises:
+        UnsupportedError: there is such a thing.
+    """
+    if problem.dynamics.tendons.names:
+        raise problem.refused(problem.solver, "meshes are not refined where tendons are implicit; take explicit ones")
+    if problem.projects:
+        message = "meshes are refined with kinematic_constraint_method Posa2016 only, which leaves no steps in states"
+        raise problem.refused(problem.solver, message)
+    if problem.dynamics.is_implicit:
+        raise problem.refused(problem.solver, "meshes are refined with multibody_dynamics_mode explicit only")
+
+
+def errors(program: Program, w: Array) -> Array:
+    """Of each interval (m,) the largest error of a state over one more than the largest size of that state."""
+    grid, layout = program.problem.grid, program.layout
+    polynomial = _Polynomial(program, w)
+    count = len(layout.names["states"])
+    sort = program.sorts[0]
+    rates, sizes = polynomial.rates, 1.0 + np.abs(w[layout.places_of["states"]]).max(axis=0)
+    result = np.zeros(len(grid.lengths))
+    of_rates = _basis(polynomial.nodes, SAMPLES)
+    starts = np.concatenate([[0.0], np.cumsum(grid.lengths)[:-1]])
+    for place, weight, row in zip(SAMPLES, WEIGHTS, of_rates, strict=True):
+        values = polynomial.at(np.full(len(starts), place), np.arange(len(starts)))
+        z = np.hstack([values[kind] for kind in KINDS if kind != "slacks"])
+        actual = np.array(sort.at(program, w, starts + place * grid.lengths, z))[:, :count]
+        missing = np.abs(np.einsum("j,kji->ki", row, rates) - actual)
+        result += weight * grid.lengths * (missing / sizes).max(axis=1)
+    return result
+
+
+def split(grid: Grid, error: Array, tolerance: float) -> Array:
+    """The mesh in which intervals of too large errors are so many equal ones as the order of the scheme asks for."""
+    order = 1 + int(grid.scheme.rates.any(axis=0).sum())
+    parts = np.ones(len(error), dtype=int)
+    large = error > tolerance
+    parts[large] = np.clip(np.ceil((error[large] / tolerance) ** (1.0 / order)), 2, MOST_PARTS)
+    lengths = np.repeat(grid.lengths / parts, parts)
+    return np.concatenate([[0.0], np.cumsum(lengths)[:-1], [1.0]])
+
+
+def carried(program: Program, w: Array, finer: Program) -> Array:
+    """What was found, on another mesh, by the polynomials of its intervals."""
+    grid, layout = program.problem.grid, finer.layout
+    starts = np.concatenate([[0.0], np.cumsum(grid.lengths)[:-1]])
+    places = finer.problem.grid.places
+    interval = np.clip(np.searchsorted(starts, places, side="right") - 1, 0, len(starts) - 1)
+    values = _Polynomial(program, w).at((places - starts[interval]) / grid.lengths[interval], interval)
+    result = layout.guess()
+    result[: layout.shared] = w[: layout.shared]
+    for kind in KINDS:
+        own = layout.places_of[kind]
+        has = own >= 0
+        result[own[has]] = values[kind][has] if kind != "slacks" else 0.0
+    return result
+
+
+def _on(problem: Problem, mesh: Array, hessian: str) -> Program:
+    """The program of the same problem on another mesh."""
+    other = copy(problem)
+    other.grid = Grid.of(problem.grid.scheme, mesh)
+    other.solver = problem.solver.copy_deep()
+    other.solver.optim_hessian_approximation = hessian
+    return Program(other)
+
+
+class _Polynomial:
+    """What a solution is between its points: states the integral of the polynomial through the rates at these.
+
+    Attributes:
+        nodes: of the scheme's points, from 0 to 1, those whose rates count (j,).
+        rates: there, times the duration of the motion (intervals, j, states).
+    """
+
+    def __init__(self, program: Program, w: Array) -> None:
+        grid, layout, scheme = program.problem.grid, program.layout, program.problem.grid.scheme
+        self.grid, self.scheme = grid, scheme
+        used = np.flatnonzero(scheme.rates.any(axis=0))
+        self.nodes = scheme.places[used]
+        points = np.array([grid.points_of(k) for k in range(len(grid.lengths))])
+        count = len(layout.names["states"])
+        rates = np.zeros((len(grid.places), count))
+        for sort in program.sorts:
+            rates[sort.numbers] = np.array(sort.value(*program._given(sort, w))).T[:, :count]
+        self.rates = rates[points[:, used]]
+        self._lines = program.problem.solver.interpolate_control_mesh_interior_points
+        self._values = {kind: w[layout.places_of[kind]][points] for kind in KINDS if kind != "slacks"}
+
+    def at(self, places: Array, intervals: Any) -> dict[str, Array]:
+        """By kind the variables (n, of that kind) at places (n,), from 0 to 1, of intervals (n,)."""
+        result = {}
+        for kind, values in self._values.items():
+            own = values[intervals]
+            if kind == "states":
+                through = _integrals(self.nodes, places)
+                way = np.einsum("nj,njs->ns", through, self.rates[intervals])
+                result[kind] = own[:, 0] + self.grid.lengths[intervals, None] * way
+            elif kind == "controls" and self._lines:
+                result[kind] = own[:, 0] + places[:, None] * (own[:, -1] - own[:, 0])
+            else:
+                result[kind] = np.einsum("nj,njs->ns", _basis(self.scheme.places, places), own)
+        return result
+
+
+def _basis(nodes: Array, places: Array) -> Array:
+    """Lagrange's polynomials of the nodes (j,) at places (n,): (n, j)."""
+    return np.polynomial.polynomial.polyvander(places, len(nodes) - 1) @ _coefficients(nodes)
+
+
+def _integrals(nodes: Array, places: Array) -> Array:
+    """Their integrals from 0 to each place."""
+    powers = np.polynomial.polynomial.polyvander(places, len(nodes))[:, 1:] / np.arange(1, len(nodes) + 1)
+    return powers @ _coefficients(nodes)
+
+
+def _coefficients(nodes: Array) -> Array:
+    result: Any = np.linalg.inv(np.vander(nodes, increasing=True))
+    return result

@@ -1,0 +1,87 @@
+"""What was found, simulated with its own controls: how long an integration stays with the solution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from osimlite.errors import OsimliteError
+from osimlite.multibody.spatial import Array
+from osimlite.optimal.given_motion import GivenMotion
+from osimlite.optimal.problem import Problem
+from osimlite.optimal.trajectory import MocoTrajectory
+from osimlite.records import dataclass
+from osimlite.simulation.run import simulate
+
+ACCURACY = 1e-7
+"""Of the integration."""
+ROWS = 1000
+"""So many moments of it are recorded, between which lines are close enough."""
+NEAR = 0.01
+"""Of a coordinate (rad or m) that is as good as found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """How far a simulation is from what was found.
+
+    Attributes:
+        times: of the solution (n,), s.
+        apart: by paths of coordinates what the values differ by (n,), rad or m.
+    """
+
+    times: Array
+    apart: dict[str, Array]
+
+    @property
+    def largest(self) -> Array:
+        """Of all coordinates (n,)."""
+        result: Array = np.max([*self.apart.values()], axis=0)
+        return result
+
+    @property
+    def near_until(self) -> float:
+        """The last time, s, up to which no coordinate is off by more than `NEAR`."""
+        far = np.flatnonzero(self.largest > NEAR)
+        return float(self.times[-1] if not len(far) else self.times[max(far[0] - 1, 0)])
+
+    def __str__(self) -> str:
+        at_end = {path: float(column[-1]) for path, column in self.apart.items()}
+        worst = max(at_end, key=lambda path: at_end[path])
+        return (
+            f"within {NEAR:g} rad or m of it up to {self.near_until:.4g} s of {self.times[-1]:.4g} s, "
+            f"{at_end[worst]:.2g} off at the end ({worst.rpartition('/')[2]})"
+        )
+
+
+def simulated(problem: Problem, trajectory: MocoTrajectory) -> Simulated:
+    """Simulate the model from the first state of a motion, with its controls, which are lines between their nodes.
+
+    Args:
+        problem: whose model moves.
+        trajectory: that was found.
+
+    Raises:
+        OsimliteError: the motion is given, begins later than at 0 s, or has parameters; the model cannot be simulated.
+    """
+    if isinstance(problem.functions, GivenMotion):
+        raise OsimliteError("the motion was given")
+    if trajectory.times[0] != 0.0 or trajectory.parameters:
+        what = "has parameters of its own" if trajectory.parameters else f"begins at {trajectory.times[0]:g} s"
+        raise OsimliteError(f"the motion {what}")
+    end = float(trajectory.times[-1])
+    start = {name: float(trajectory.columns[name][0]) for name in trajectory.names["states"]}
+    found = simulate(
+        problem.model,
+        end,
+        accuracy=ACCURACY,
+        report_interval=end / ROWS,
+        initial=start,
+        controls=trajectory.table("controls"),
+        folder=problem.folder,
+    )
+    columns = {info.path: found.values[:, k] for k, info in enumerate(found.mechanism.coordinates)}
+    apart = {
+        path: np.abs(np.interp(trajectory.times, found.times, columns[path]) - trajectory.columns[f"{path}/value"])
+        for path in problem.functions.coordinates
+    }
+    return Simulated(trajectory.times, apart)
