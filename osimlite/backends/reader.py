@@ -10,6 +10,7 @@ import ast
 import builtins
 import inspect
 from collections.abc import Callable
+from functools import cached_property
 from textwrap import dedent
 from typing import Any
 
@@ -30,7 +31,6 @@ class Kernel:
         tree: of its text.
         body: its statements without the docstring.
         given: names of its arguments.
-        own: names of its other variables, in the order of their first appearance.
     """
 
     def __init__(self, function: Function, language: str) -> None:
@@ -39,7 +39,11 @@ class Kernel:
         self.function, self.tree, self.language = function, tree, language
         self.body = tree.body[1:] if ast.get_docstring(tree) else tree.body
         self.given = [argument.arg for argument in tree.args.args]
-        self.own = [name for name in stored(tree) if name not in self.given]
+
+    @cached_property
+    def own(self) -> list[str]:
+        """Names of its other variables, in the order of their first appearance."""
+        return [name for name in stored(self.tree) if name not in self.given]
 
     @property
     def name(self) -> str:

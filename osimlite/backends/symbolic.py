@@ -131,8 +131,9 @@ class _Writer(Kernel, ast.NodeTransformer):
 
     def made(self) -> Any:
         """The function."""
-        tree = copy.deepcopy(self.tree)
-        body = [part for item in self.body for part in self._listed(self.visit(copy.deepcopy(item)))]
+        # It was read for this, and nobody else has it.
+        tree = self.tree
+        body = [part for item in self.body for part in self._listed(self.visit(item))]
         clear = [ast.Assign([_set(name)], _name("unset_")) for name in sorted(self.cleared - set(self.given))]
         tree.body, tree.returns, tree.decorator_list = [*clear, *body], None, []
         for argument in tree.args.args:

@@ -56,7 +56,7 @@ class Asked:
             return {"file": str(self.file)}
         found = [(number, text) for number, text in enumerate(lines, 1) if tags.search(text)]
         found = [pair for pair in found if named.search(pair[1])] or found
-        return {"file": str(self.file), "line": found[0][0] if found else None}
+        return {"file": str(self.file), "line": found[0][0] if found else 1}
 
     def refused(self, part: Object, reason: str) -> UnsupportedError:
         """The error of what is not solved here."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from osimlite.document.kept import read_anew
 from osimlite.multibody.spatial import Array
+from osimlite.optimal.asked import Asked
 from osimlite.optimal.point import Series
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.steps import contact_at
@@ -29,13 +30,14 @@ def measured_groups(goal: Goal, problem: Problem) -> list[tuple[list[str], list[
         UnsupportedError: what is measured is along other axes, or the half space is what it pushes.
     """
     loads: Any = goal.external_loads
-    folder = problem.folder
+    folder, file = problem.folder, problem.file
     if loads is None:
         if not goal.external_loads_file.strip():
             raise problem.wrong(goal, "it has no external_loads and names no external_loads_file")
-        path = problem.place(goal.external_loads_file)
-        loads, folder = read_anew(path, ExternalLoads), path.parent
-    table = loads_table(loads, folder, None)
+        file = problem.place(goal.external_loads_file)
+        loads, folder = read_anew(file, ExternalLoads), file.parent
+        Asked(file, None).expect_sound(loads)
+    table = loads_table(loads, folder, None if file is None else str(file))
     known = {force.name: force for force in loads.objects}
     groups = []
     for group in goal.contact_groups:

@@ -90,8 +90,8 @@ class Followed:
         if self.states is None or not self.states.filepath.strip():
             raise problem.wrong(goal, "it names no file to follow")
         motion = table_of(problem, goal, self.states)
-        return StoTable("", motion.times, tuple(f"{path}{end}" for path in paths for end in ends),
-                        self._computed(problem, motion, paths))  # fmt: skip
+        columns = tuple(f"{path}{end}" for path in paths for end in ends)
+        return StoTable("", motion.times, columns, self._computed(problem, motion, paths), file=motion.file)
 
     def _computed(self, problem: Problem, motion: StoTable, paths: Sequence[str]) -> Array:
         """What is followed (n, values) in a motion; states that it leaves out are those of the model."""

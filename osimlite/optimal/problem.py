@@ -81,6 +81,8 @@ class Problem(Asked):
         self.expect_sound(study)
         self.phase = study.problem.phases
         self.series: list[Series] = []
+        # What programs on other meshes share, by whether it is of points of the mesh, and of such that are moved.
+        self.formulas: dict[tuple[bool, bool], Any] = {}
         if not isinstance(study.solver, MocoCasADiSolver):
             raise self.refused(study.solver, "of solvers only MocoCasADiSolver is known")
         self.solver: MocoCasADiSolver = study.solver

@@ -9,6 +9,7 @@ function, E(s, z_0, z_n, integrals).
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,24 +23,22 @@ from osimlite.optimal.point import Ends, Point
 from osimlite.optimal.problem import Problem
 
 SX: Any = casadi.SX
+OPTIONS = {"cse": True}
 
 
-class PointFunction:
-    """F and its derivatives for the points of one sort, those of the mesh or those between."""
+class PointFormula:
+    """F and its derivatives at a point of one sort, whatever the mesh: those of the mesh, or those between."""
 
-    def __init__(self, program: Program, numbers: list[int]) -> None:
+    def __init__(self, program: Program, number: int, size: int) -> None:
         problem, layout = program.problem, program.layout
-        self.numbers = np.array(numbers, dtype=int)
-        self.columns = np.array([layout.places[number] for number in numbers])
-        self.projected = len(layout.names["projections"]) if layout.has("projections", numbers[0]) else 0
-        size = self.columns.shape[1]
+        is_mesh = bool(problem.grid.is_mesh[number])
+        self.projected = len(layout.names["projections"]) if layout.has("projections", number) else 0
         s, z = SX.sym("s", layout.shared), SX.sym("z", size)
         place, known = SX.sym("place"), SX.sym("known", program.known_size)
-        point = program.point(s, z, place, known, numbers[0])
+        point = program.point(s, z, place, known, number)
         duration = s[1] - s[0]
         names, residuals = problem.dynamics.residuals(point)
         rows, labels, limits = [residuals], [*names], [(0.0, 0.0)] * len(names)
-        is_mesh = bool(problem.grid.is_mesh[numbers[0]])
         if is_mesh or problem.solver.enforce_path_constraint_mesh_interior_points:
             for own in problem.path_rows:
                 rows.append(own.formula(point))
@@ -62,27 +61,47 @@ class PointFunction:
         ]
         column = casadi.densify(casadi.vertcat(duration * casadi.vertcat(*rates), *rows, *integrands))
         self.labels, self.limits, self.rows = labels, limits, column.numel()
-        given = [s, z, place, known]
-        both, multipliers = casadi.vertcat(s, z), SX.sym("multipliers", self.rows)
+        given, both, multipliers = [s, z, place, known], casadi.vertcat(s, z), SX.sym("multipliers", self.rows)
         jacobian = casadi.jacobian(column, both)
-        self.jacobian_rows, self.jacobian_columns = map(np.array, jacobian.sparsity().get_triplet())
-        options, count = {"cse": True}, len(numbers)
-        self._formula = casadi.Function("F", given, [column], options)
-        self.value = self._formula.map(count)
-        self.slope = casadi.Function("J", given, [casadi.vertcat(*jacobian.nonzeros())], options).map(count)
-        self._hessian_parts: Any = [*given, multipliers], casadi.dot(multipliers, column), both, count
+        self.jacobian_entries = [*map(np.array, jacobian.sparsity().get_triplet())]
+        self.value = casadi.Function("F", given, [column], OPTIONS)
+        self.slope = casadi.Function("J", given, [casadi.vertcat(*jacobian.nonzeros())], OPTIONS)
+        self._hessian_parts: Any = [*given, multipliers], casadi.dot(multipliers, column), both
+
+    @cached_property
+    def curvature(self) -> tuple[Any, list[Any]]:
+        """The second derivatives, with their rows and columns; they are only made if they are asked for."""
+        given, combined, both = self._hessian_parts
+        hessian = casadi.triu(casadi.hessian(combined, both)[0])
+        function = casadi.Function("H", given, [casadi.vertcat(*hessian.nonzeros())], OPTIONS)
+        return function, [*map(np.array, hessian.sparsity().get_triplet())]
+
+
+class PointFunction:
+    """F and its derivatives for the points of one sort."""
+
+    def __init__(self, program: Program, numbers: list[int]) -> None:
+        problem, layout = program.problem, program.layout
+        self.numbers = np.array(numbers, dtype=int)
+        self.columns = np.array([layout.places[number] for number in numbers])
+        sort = bool(problem.grid.is_mesh[numbers[0]]), layout.has("projections", numbers[0])
+        if sort not in problem.formulas:
+            problem.formulas[sort] = PointFormula(program, numbers[0], self.columns.shape[1])
+        self.formula = formula = problem.formulas[sort]
+        self.projected = formula.projected
+        self.labels, self.limits, self.rows = formula.labels, formula.limits, formula.rows
+        self.jacobian_rows, self.jacobian_columns = formula.jacobian_entries
+        self.value, self.slope = (each.map(len(numbers)) for each in (formula.value, formula.slope))
 
     def at(self, program: Program, w: Array, places: Array, z: Array) -> Array:
         """F (n, rows) at other places (n,), from 0 to 1, with these variables (n, ...)."""
         given = program._given_at(w, places, z)
-        return np.array(self._formula.map(len(places))(*given)).T
+        return np.array(self.formula.value.map(len(places))(*given)).T
 
     def make_hessian(self) -> None:
         """The second derivatives are only made if they are asked for."""
-        given, combined, both, count = self._hessian_parts
-        hessian = casadi.triu(casadi.hessian(combined, both)[0])
-        self.hessian_rows, self.hessian_columns = map(np.array, hessian.sparsity().get_triplet())
-        self.curvature = casadi.Function("H", given, [casadi.vertcat(*hessian.nonzeros())], {"cse": True}).map(count)
+        function, (self.hessian_rows, self.hessian_columns) = self.formula.curvature
+        self.curvature = function.map(len(self.numbers))
 
 
 class Program:

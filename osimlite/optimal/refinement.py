@@ -124,6 +124,9 @@ def refuse(problem: Problem) -> None:
     """
     if problem.dynamics.tendons.names:
         raise problem.refused(problem.solver, "meshes are not refined where tendons are implicit; take explicit ones")
+    if problem.projects:
+        message = "meshes are refined with kinematic_constraint_method Posa2016 only, which leaves no steps in states"
+        raise problem.refused(problem.solver, message)
     if problem.dynamics.is_implicit:
         raise problem.refused(problem.solver, "meshes are refined with multibody_dynamics_mode explicit only")
 

@@ -67,7 +67,11 @@ class MocoTrajectory:
         table = read_sto(path)
         if not len(table.times):
             raise DocumentError("the file has no times", file=str(path))
-        counts = [int(table.header.get(f"num_{kind}", 0)) for kind in COUNTS]
+        said = {f"num_{kind}": table.header.get(f"num_{kind}", "0") for kind in COUNTS}
+        for name, word in said.items():
+            if not word.isdecimal():
+                raise DocumentError(f"the header says {name}={word}, which is no count", file=str(path))
+        counts = [*map(int, said.values())]
         if not any(counts):
             counts[0] = len(table.columns)
         if sum(counts) != len(table.columns):

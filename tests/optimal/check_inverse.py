@@ -56,6 +56,18 @@ def test_ours_costs_no_more(tmp_path):
     assert "/jointset/hip_r/hip_flexion_r/value" in found.states.columns
 
 
+def test_meshes_of_given_motions_are_refined(tmp_path):
+    """With rigid tendons; where they are implicit it is refused."""
+    with pytest.raises(OsimliteError, match="not refined where tendons are implicit"):
+        inverse(squat(tmp_path), folder=tmp_path, refine=1e-3)
+    rigid = squat(tmp_path, mesh_interval=0.2)
+    rigid.model.operators.append(osimlite.ModOpIgnoreTendonCompliance())
+    found = inverse(rigid, folder=tmp_path, refine=1e-3)
+    assert found.success
+    assert found.rounds[0].error > 1e-3 >= found.rounds[-1].error
+    assert found.states.times[-1] == pytest.approx(1.0)
+
+
 def test_columns_that_are_no_states_must_be_allowed(tmp_path):
     with pytest.raises(OsimliteError, match=r"is no state.*set kinematics_allow_extra_columns"):
         problem_of_inverse(squat(tmp_path, kinematics_allow_extra_columns=False), folder=tmp_path)
@@ -63,8 +75,11 @@ def test_columns_that_are_no_states_must_be_allowed(tmp_path):
 
 def test_setups_are_run_and_tell_the_motion_too(tmp_path):
     osimlite.write(squat(tmp_path, mesh_interval=0.2), tmp_path / "setup.xml")
-    outcome = osimlite.run(tmp_path / "setup.xml")
+    outcome = osimlite.run(tmp_path / "setup.xml", simulates=True)
     assert outcome.done
+    assert ("not simulated", "the motion was given") in outcome.told
+    page = osimlite.report({tmp_path / "setup.xml": outcome}, tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "<h2>Controls</h2>" in page and "<h2>Contact forces</h2>" not in page
     table = outcome.tables["squat_solution.sto"]
     assert {"/jointset/hip_r/hip_flexion_r/value", "/jointset/hip_r/hip_flexion_r/speed"} <= {*table.columns}
     speed = np.gradient(table["/jointset/hip_r/hip_flexion_r/value"], table.times)

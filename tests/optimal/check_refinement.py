@@ -97,6 +97,9 @@ def test_what_has_no_error_here_is_refused(tmp_path):
     hanging.problem.phases.goals[1].enabled = False
     with pytest.raises(osimlite.OsimliteError, match="not refined where tendons are implicit"):
         solve(hanging, refine=1e-3)
+    moved = study(tmp_path, "squat-25", kinematic_constraint_method="Bordalba2023")
+    with pytest.raises(osimlite.OsimliteError, match="kinematic_constraint_method Posa2016 only"):
+        solve(moved, refine=1e-3)
 
 
 def test_the_command(tmp_path, capfd):

@@ -109,6 +109,9 @@ def project(kind: str, folder: Path) -> Project:
     study.problem.phases.model = osimlite.ModelProcessor(name="model", filepath="model.osim")
     study.solver.optim_max_iterations = 1
     osimlite.write(study, folder / "study.omoco")
+    # Its rows end with a tab, which nothing needs.
+    markers = folder / "markers.trc"
+    markers.write_text("".join(line.rstrip() + "\n" for line in markers.read_text().splitlines()))
     used = {file.name: file.read_text() for file in sorted(folder.iterdir())}
     text = used["study.omoco"]
     needed = [name for name in used if f">{name}<" in text or name in ("model.osim", "study.omoco")]

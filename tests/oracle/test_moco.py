@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -17,6 +18,7 @@ from osimlite.simulation.files.trc import write_trc
 from tests.conftest import ROOT
 from tests.optimal.small import coupled, links
 from tests.optimal.studies import moco_said, study_file
+from tests.optimal.study_faults import project
 
 pytestmark = pytest.mark.skipif(find_spec("casadi") is None, reason="needs the casadi package")
 
@@ -341,6 +343,45 @@ def test_states_that_are_moved_onto_constraints(scheme, mode, tmp_path):
     assert missed < 1e-6 < slack
     assert success
     assert objective <= sum(theirs.values()) * (1.0 + 1e-4)
+
+
+TAKEN = """
+import json, sys
+import opensim as osim
+osim.Logger.setLevelString("off")
+solution = osim.MocoStudy("study.omoco").solve()
+print(json.dumps(solution.getStatus()))
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (r"<bounds>(0.6 0.9)<", "nan 1", "bounds is nan, which is no number"),
+        (r"<bounds>(0.6 0.9)<", "-2 -1", "ends at -1 s at the latest, and begins at 0 s"),
+        (r"<bounds>(0.6 0.9)<", "5 9", "data from 0 s to 1 s, and the motion is at least from 0.2 s to 5 s"),
+        (
+            r"(<MocoVariableInfo name=\"/jointset/j0/q0/value.*?</MocoVariableInfo>)",
+            '<Constant name="no" />',
+            "its place",
+        ),
+        (r"<MocoControlTrackingGoalReference name=\"(/forceset/motor0)", "/motor0", "has no control '/motor0'"),
+    ],
+)
+def test_what_moco_takes_without_a_word(old, new, said, tmp_path):
+    """And is refused here with one sentence; the page says so."""
+    pytest.importorskip("opensim")
+    project("followed", tmp_path)
+    study = tmp_path / "study.omoco"
+    text = study.read_text()
+    at = re.search(old, text, re.DOTALL).span(1)
+    study.write_text(text[: at[0]] + new + text[at[1] :])
+    assert _said(tmp_path, ["-c", TAKEN]) == "Maximum_Iterations_Exceeded"
+    # As CasADi and OpenSim cannot be loaded into one process, in another one.
+    command = [sys.executable, "-c", "import osimlite; osimlite.moco.solve('study.omoco')"]
+    done = subprocess.run(command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True,
+                          text=True, check=False)  # fmt: skip
+    assert done.returncode == 1 and said in done.stderr.splitlines()[-1]
 
 
 SCALED = """

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -18,17 +20,67 @@ pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytestmark = [pytest.mark.oracle, pytest.mark.skipif(find_spec("casadi") is None, reason="needs the casadi package")]
 
 
-def test_opensim_walks_as_we_do(tmp_path, repo):
+MOCO = """
+import json
+import opensim as osim
+osim.Logger.setLevelString("Off")
+solution = osim.MocoStudy("human-walks.omoco").solve()
+solution.unseal()
+solution.write("theirs.sto")
+print(json.dumps({name: solution.getObjectiveTerm(name) for name in solution.getObjectiveTermNames()}))
+"""
+OURS = """
+import json
+from osimlite import moco
+from osimlite.optimal.program import Program
+program = Program(moco.problem_of("human-walks.omoco"))
+print(json.dumps(moco.evaluated(program, moco.MocoTrajectory.read("theirs.sto"))[0]))
+"""
+
+
+@pytest.fixture
+def build(tmp_path, repo):
+    """Builds the model and its study with other settings of the solver; the file of the model."""
+
+    def built(**settings):
+        model = tmp_path / "human-walks.osim"
+        command = [sys.executable, "-m", "osimlite", "build", "human-walks", "-o", str(model)]
+        subprocess.run(command, cwd=repo, check=True, capture_output=True)
+        study = osimlite.read_document(model.with_suffix(".omoco"))
+        for name, value in settings.items():
+            setattr(study.solver, name, value)
+        osimlite.write(study, model.with_suffix(".omoco"))
+        return model
+
+    return built
+
+
+def test_moco_has_the_same_costs(build, repo):
+    """Of the guess, as Ipopt moves it away from the bounds."""
+    model = build(num_mesh_intervals=4, optim_max_iterations=0)
+    theirs, ours = (
+        json.loads(
+            subprocess.run(
+                [sys.executable, "-c", code],
+                cwd=model.parent,
+                env=os.environ | {"PYTHONPATH": str(repo)},
+                check=True,
+                capture_output=True,
+                text=True,
+            ).stdout.splitlines()[-1]
+        )
+        for code in (MOCO, OURS)
+    )
+    assert ours == pytest.approx(theirs, rel=1e-10)
+    assert {*ours} == {"effort", "roughness"}
+
+
+def test_opensim_walks_as_we_do(build, tmp_path, repo):
     """For a step; then the motion, which nothing holds, has made some thousands of what it was off."""
-    model = tmp_path / "human-walks.osim"
-    study = model.with_suffix(".omoco")
+    model = build(num_mesh_intervals=16, optim_convergence_tolerance=1e-2)
     # CasADi and OpenSim cannot be loaded into one process.
-    run = [sys.executable, "-m", "osimlite"]
-    subprocess.run([*run, "build", "human-walks", "-o", str(model)], cwd=repo, check=True, capture_output=True)
-    given = osimlite.read_document(study)
-    given.solver.num_mesh_intervals, given.solver.optim_convergence_tolerance = 16, 1e-2
-    osimlite.write(given, study)
-    subprocess.run([*run, "run", str(study), "-o", str(tmp_path)], cwd=repo, check=True, capture_output=True)
+    command = [sys.executable, "-m", "osimlite", "run", str(model.with_suffix(".omoco")), "-o", str(tmp_path)]
+    subprocess.run(command, cwd=repo, check=True, capture_output=True)
     stride = read_sto(tmp_path / "human-walks_stride.sto")
     step = float(stride.times[len(stride.times) // 2])
     opensim.Logger.setLevelString("Error")
