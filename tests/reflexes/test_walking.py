@@ -173,3 +173,20 @@ def test_scone_s_human_walks_twenty_seconds() -> None:
     walked = scenario.walk(scenario.best())
     assert walked.times[0] == 20.0 and walked.terms["Gait"][0] == 0.0
     assert 1.0 < walked.report["speed"][0] < 1.06 and 34 <= walked.report["steps"][0] <= 38
+
+
+def test_kernels_as_python_walk_likewise(ours, arm, monkeypatch) -> None:
+    """Where a place outside an array is an error."""
+    from tests.simulation.checked import Checked
+
+    for file, seconds in ((ours.path, ours.step), (arm, 0.02)):
+        compiled = Scenario(file)
+        expected = compiled.walk(compiled.best(), duration=seconds)
+        with monkeypatch.context() as patched:
+            patched.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
+            plain = Scenario(file)
+            walked = plain.walk(plain.best(), duration=seconds)
+        for name in ("states", "excitations", "loads"):
+            rows = getattr(walked, name).rows
+            assert np.allclose(rows, getattr(expected, name).rows, rtol=1e-12, atol=1e-12)
+        assert np.allclose(walked.results, expected.results, rtol=1e-11)

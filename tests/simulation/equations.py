@@ -64,7 +64,7 @@ class Equations:
         structure[[MODEL.DOFS, MODEL.STATE_SIZE, MODEL.WORK_STATE]] = n, size, first
         structure[MODEL.WORK_SIZE] = first + record.STATES * size
         kernels = {MODEL.LAWS + LAW_NUMBERS["evaluate"]: evaluate}
-        packed = Packed(structure, np.zeros(1), (), kernels, {}, {}, {}, (), [], [])
+        packed = Packed(structure, np.zeros(1), (), kernels, {}, {}, {}, {}, (), [], [])
         self.program = Program(packed, code, ("run_several", "merson"))
         self.structure, self.numbers, self.order = structure, packed.numbers, (0,) * n
         self.counted = (n, n) if counted is None else counted
