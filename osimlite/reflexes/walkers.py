@@ -117,7 +117,6 @@ class Walkers:
         self.rows, self.excitations = np.zeros((count, self.senses[SENSES.SIZE])), np.zeros((count, len(self.muscles)))
         self.progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
         self._driven: Ints = np.array([self.copies.places, self.activations])
-        self.engine.program.code.make_ready(("walk_several",))
 
     def _sensing(self) -> tuple[Ints, Array]:
         """Plan of what is felt, and its numbers; see :mod:`osimlite.simulation.kernels.senses`."""
@@ -212,7 +211,6 @@ class Walkers:
         whole = np.zeros((self.count, first + room))
         self.noted = whole[:, first:]
         self._asked = self.senses, self.known, self._driven, plan, numbers, criteria, bounds, whole
-        self.copies.vectors[:, self.copies.places] = 0.0
 
     def go(self, order: int, which: Sequence[int] | None = None) -> Array:
         """Have walkers (all by default) go on by an order of :mod:`osimlite.simulation.kernels.walks`.

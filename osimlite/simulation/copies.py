@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from math import inf
 from typing import Any
@@ -40,7 +40,7 @@ class Copies:
     Attributes:
         states: of all copies (w, y), in the order of the engine; they are changed in place.
         controls: names of the actuators, in the order in which controls are given.
-        vectors: numbers of the model, of each copy (w, x), and `places` where they have the controls (c,).
+        places: where the numbers of the model have them (c,).
     """
 
     def __init__(
@@ -58,12 +58,11 @@ class Copies:
         self._step = step
         options = BatchOptions(to=step, accuracy=accuracy, integrator=integrator, step_bounds=(0.0, longest))
         options.check()
-        vectors = np.tile(engine.numbers, (count, 1))
-        self._batch = Batch(engine, np.tile(self.start, (count, 1)), options, vectors=vectors, start_holds=True)
-        self.vectors = vectors
+        self._batch = Batch(engine, np.tile(self.start, (count, 1)), options, start_holds=True)
         self._first_step = float(self._batch.clocks[0, 1])
         self._parts = [(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE)]
-        self._rooms = [self._batch.room() for _ in range(min(cores(), count))]
+        # Each core works on numbers of the model of its own, which are few enough to be near.
+        self._rooms = [(self._batch.room(), engine.numbers.copy()) for _ in range(min(cores(), count))]
         self._pool = ThreadPoolExecutor(len(self._rooms) - 1) if len(self._rooms) > 1 else None
 
     def _places_of(self, driven: Any) -> NDArray[np.int64]:
@@ -86,36 +85,28 @@ class Copies:
 
     def step(self, controls: Array) -> NDArray[np.bool_]:
         """Hold controls (w, c) for a step; which of the copies (w,) could go on to its end."""
-        batch = self._batch
-        self.vectors[:, self.places] = controls
-        # Each step is a run of its own: a method that goes by earlier steps has none, those of other copies least.
-        batch.clocks[:, 0] = 0.0
-        batch.counts[:] = batch.endings[:] = 0
-        self.together(batch.run, self._parts)
-        return (batch.endings == 0) & np.isfinite(batch.states).all(axis=1)
+        going = np.zeros(len(self.states), dtype=np.int64)
+        self._together("hold_several", self._parts, self.places, np.array(controls, dtype=np.float64, order="C"), len(self.places), going)
+        return going > 0
 
     def walk(self, which: Sequence[int], *parts: Any) -> int:
         """Have copies walk by :func:`osimlite.simulation.kernels.walks.walk_several`; returns what that says last."""
-        said: list[int] = []
+        return self._together("walk_several", [(k, k + 1) for k in which], *parts)
 
-        def work(room: Floats, first: int, last: int) -> None:
-            said.append(self._batch.walk(room, *parts, first, last))
+    def _together(self, law: str, parts: Sequence[tuple[int, int]], *given: Any) -> int:
+        """Have all cores compute parts of the copies, from the first to before the last."""
+        self.engine.program.code.make_ready((law,))
+        left, said = iter(parts), [0]
 
-        self.together(work, [(k, k + 1) for k in which])
-        return max(said)
-
-    def together(self, work: Callable[[Floats, int, int], Any], parts: Sequence[tuple[int, int]]) -> None:
-        """Have all cores do work on some of the copies, from the first to before the last, each core in a room."""
-        left = iter(parts)
-
-        def share(room: Floats) -> None:
+        def share(room: Floats, numbers: Floats) -> None:
             for first, last in left:
-                work(room, first, last)
+                said.append(self._batch.hold(law, room, numbers, *given, first, last))
 
-        others = [] if self._pool is None else [self._pool.submit(share, room) for room in self._rooms[1:]]
-        share(self._rooms[0])
+        others = [] if self._pool is None else [self._pool.submit(share, *room) for room in self._rooms[1:]]
+        share(*self._rooms[0])
         for other in others:
             other.result()
+        return max(said)
 
     def close(self) -> None:
         """Free threads and engine."""

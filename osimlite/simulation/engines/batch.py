@@ -84,7 +84,7 @@ class Batch:
         self._sizes = np.array((*sizes, start_holds, address, self._method_at), dtype=np.int64)
         self.clocks = np.empty((count, 2))
         self.clocks[:] = start, next_step
-        self.counts, self.endings = np.zeros((count, 6), dtype=np.int64), np.zeros(count, dtype=np.int64)
+        self.counts, self.endings = np.zeros((count, record.COUNTED), dtype=np.int64), np.zeros(count, dtype=np.int64)
         self.reports = np.full((count, len(self._times), size), np.nan)
         self.events, self.peaks = np.zeros((count, options.most_events, event)), np.zeros((count, pairs, 2))
         self.log, self.forces = np.empty((most_logged, 1 + 2 * size)), np.empty((most_logged, pairs, 3))
@@ -102,17 +102,25 @@ class Batch:
         size = self.states.shape[1]
         first_error = int(self._engine.structure[MODEL.WORK_STATE]) + ERRORS * size
         self.errors = room[first_error : first_error + size]
-        records = self._times, self.reports, self.log, self.forces, self.events, self.peaks
-        parts = *records, self._kinds, self._levels, self.endings, first, len(self.states) if last is None else last
-        self._call("run_several", room, *parts)
-
-    def walk(self, room: Floats, *parts: Any) -> int:
-        """As `run`, with what `walks.walk_several` takes besides."""
-        return self._call("walk_several", room, self.peaks, *parts)
-
-    def _call(self, name: str, room: Floats, *parts: Any) -> int:
-        vectors, program = self._vectors, self._engine.program
-        room[self._method_at :][: len(self._settings)] = self._settings
+        vectors = self._vectors
         each = vectors.shape[1] if len(vectors) > 1 else 0
         own = self._sizes, self.clocks, self.counts, self.states
-        return program.run(program.code.entry(name), program.ints, vectors, room, each, *own, *parts)
+        records = self._times, self.reports, self.log, self.forces, self.events, self.peaks
+        parts = *records, self._kinds, self._levels, self.endings, first, len(self.states) if last is None else last
+        self._call("run_several", vectors, room, each, *own, *parts)
+
+    def hold(self, law: str, room: Floats, numbers: Floats, *parts: Any) -> int:
+        """Compute by a law of :mod:`osimlite.simulation.kernels.walks`, with what it takes besides.
+
+        Args:
+            law: its name.
+            room: as of `run`.
+            numbers: of the model (x,), which are changed.
+            parts: as said.
+        """
+        return self._call(law, numbers, room, self._sizes, self.clocks, self.counts, self.states, self.peaks, *parts)
+
+    def _call(self, law: str, numbers: Floats, room: Floats, *parts: Any) -> int:
+        room[self._method_at :][: len(self._settings)] = self._settings
+        program = self._engine.program
+        return program.run(program.code.entry(law), program.ints, numbers, room, *parts)

@@ -20,7 +20,7 @@ after as many tried steps as were allowed."""
 TIME_OF_EVENT = 1e-9
 """How exactly the time of an event is found on the interpolated motion, s."""
 
-TAKEN, ATTEMPTED, EVALUATIONS, REPORTED, LOGGED, EVENTS = 0, 1, 2, 3, 4, 5
+TAKEN, ATTEMPTED, EVALUATIONS, REPORTED, LOGGED, EVENTS, COUNTED = range(7)
 """Indices of what a run counts: steps taken and attempted, evaluations, rows reported and logged, events."""
 
 COORDINATE, HEIGHT, TOUCH = 0, 1, 2

@@ -17,6 +17,7 @@ LAW_MODULES = {
     "evaluate": "dynamics",
     "equilibrate": "dynamics",
     "run_several": "runs",
+    "hold_several": "walks",
     "walk_several": "walks",
     "merson": "merson",
     "euler2": "euler2",

@@ -1,6 +1,6 @@
-"""Whole walks in one call: control steps of reflexes, the motion between, what is felt, and how it is judged.
+"""Motions of copies whose controls are held for a step, and whole walks in one call.
 
-Controls are computed at the start of a control step and held.
+A walk are control steps of reflexes, the motion between, what is felt, and how it is judged.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from osimlite.simulation.kernels.criteria import begin_criteria, judged
 from osimlite.simulation.kernels.layout import MODEL, OUTCOME, STAGE
 from osimlite.simulation.kernels.method import HAS_DERIVATIVE
 from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.record import DONE, EVALUATIONS, EVENTS, METHOD_AT, Motion, evaluated
+from osimlite.simulation.kernels.record import COUNTED, DONE, EVALUATIONS, METHOD_AT, Motion, evaluated
 from osimlite.simulation.kernels.reflexes import EARLY_STANCE, REFLEXES, UNKNOWN, add_reflexes, go_on, note_senses
 from osimlite.simulation.kernels.runs import run
 from osimlite.simulation.kernels.senses import SENSED, SENSES, feel
@@ -44,11 +44,56 @@ class Walk(NamedTuple):
     progress: Ints  # see STEPS
 
 
+def hold_several(
+    s: Ints,
+    x: Floats,
+    w: Floats,
+    sizes: Ints,
+    clocks: Floats,
+    counts: Ints,
+    states: Floats,
+    peaks: Floats,
+    places: Ints,
+    controls: Floats,
+    held_by: int,
+    going: Ints,
+    first: int,
+    last: int,
+) -> int:
+    """A control step of the copies `first` to `last` - 1.
+
+    Args: as of `runs.run_several`; where the numbers have the controls, these of each copy, how many it has; which come
+    to the end of the step.
+    """
+    for k in range(first, last):
+        for number in range(held_by):
+            x[places[number]] = controls[held_by * k + number]
+        m = motion_of(s, x, w, sizes, clocks, counts, peaks, places, k)
+        going[k] = 1 if held(m, at(states, s[MODEL.STATE_SIZE] * k)) else 0
+    return OUTCOME.OK
+
+
+def motion_of(
+    s: Ints, x: Floats, w: Floats, sizes: Ints, clocks: Floats, counts: Ints, peaks: Floats, unused: Ints, k: int
+) -> Motion:
+    """Of one of several, which has no reports, log, events and watches."""
+    peak = at(peaks, 2 * k * s[MODEL.CONTACTS])
+    clock, count = at(clocks, 2 * k), at(counts, COUNTED * k)
+    return Motion(s, x, w, sizes, clock, count, peak, peak, peak, peak, peak, peak, unused, peak)
+
+
+def held(m: Motion, y: Floats) -> bool:
+    """Whether a state has gone on to the end of a control step. Each is a run of its own: no method knows what was."""
+    m.clock[0] = 0.0
+    for k in range(COUNTED):
+        m.counts[k] = 0
+    return run(m, y) == DONE and is_finite(m.s[MODEL.STATE_SIZE], y)
+
+
 def walk_several(
     s: Ints,
     x: Floats,
     w: Floats,
-    each: int,
     sizes: Ints,
     clocks: Floats,
     counts: Ints,
@@ -79,10 +124,7 @@ def walk_several(
     """
     size, status = s[MODEL.STATE_SIZE], OUTCOME.OK
     for k in range(first, last):
-        clock, count, peak = at(clocks, 2 * k), at(counts, 6 * k), at(peaks, 2 * k * s[MODEL.CONTACTS])
-        m = Motion(
-            s, at(x, each * k), w, sizes, clock, count, peak, peak, peak, peak, peak, peak, senses, peak
-        )  # fmt: skip
+        m = motion_of(s, x, w, sizes, clocks, counts, peaks, senses, k)
         walk = Walk(
             m,
             senses,
@@ -109,6 +151,8 @@ def walk_several(
 def begun(a: Walk, y: Floats, order: int) -> int:
     """Feel what is at a state, and begin what is to begin."""
     m = a.m
+    for k in range(a.senses[SENSES.MUSCLES]):
+        m.x[a.muscles[k]] = 0.0
     status = evaluated(m, 0.0, y, at(m.w, m.s[MODEL.WORK_STATE]), STAGE.FORCE)
     if status != OUTCOME.OK:
         return status
@@ -139,14 +183,10 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
             copy(a.senses[SENSES.LEGS], at(a.row, a.senses[SENSES.LOADS]), at(record, size + muscles))
         for k in range(muscles):
             m.x[a.muscles[k]] = a.excitations[k]
-        # Each step is a run of its own.
-        m.clock[0] = 0.0
-        for k in range(EVENTS + 1):
-            m.counts[k] = 0
-        ending = run(m, y)
+        goes_on = held(m, y)
         progress[STEPS] += 1
         progress[FORCES] += m.counts[EVALUATIONS]
-        if ending != DONE or not is_finite(size, y):
+        if not goes_on:
             progress[GOING] = 0
             return
         if m.s[MODEL.CONTACTS] == 0 and m.w[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0:
