@@ -86,7 +86,14 @@ class Copies:
     def step(self, controls: Array) -> NDArray[np.bool_]:
         """Hold controls (w, c) for a step; which of the copies (w,) could go on to its end."""
         going = np.zeros(len(self.states), dtype=np.int64)
-        self._together("hold_several", self._parts, self.places, np.array(controls, dtype=np.float64, order="C"), len(self.places), going)
+        self._together(
+            "hold_several",
+            self._parts,
+            self.places,
+            np.array(controls, dtype=np.float64, order="C"),
+            len(self.places),
+            going,
+        )
         return going > 0
 
     def walk(self, which: Sequence[int], *parts: Any) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import linecache
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -123,11 +123,17 @@ class KernelText:
         of_moment = len(self._inputs) + 1 + sum(state.given for state in kind.states)
         told = f"known({', '.join(known.values())}), {arguments[of_moment]}"
         begin = f"{', '.join(known.values())} = {self._call(arguments[: of_moment + 1], 'begin')}"
-        lines = self._each([*kind.geometry.before, *self._noted(inputs), begin])
+        going = f"if {known[made.known._fields[0]]} > 0.0:"
+        *_, last = asks = [self._asking(part, known) for part in (*made.parts, made.search)]
+        last[:] = [going, *(f"    {line}" for line in last)]
+        lines = ["asked = 0", *self._each([*kind.geometry.before, *self._noted(inputs), begin, *asks[0]])]
+        # Whoever has an answer asks for the next at once.
+        answer = ["curves_at(x, lanes, asked)", "asked = answered = 0"]
         for number, part in enumerate(made.parts):
-            lines += self._asking(part, f"law_{number}", known, told)
-        step = self._asking(made.search, "search", known, told, f"if {known[made.known._fields[0]]} > 0.0:")
-        lines += ["going = 1", "while going > 0:", *(f"    {line}" for line in step), "    going = asked"]
+            lines += [*answer, *self._each([*self._answering(part, f"law_{number}", known, told), *asks[number + 1]])]
+        step = self._answering(made.search, "search", known, told)
+        step = [*answer, *self._each([going, *(f"    {line}" for line in (*step, *last))])]
+        lines += ["while asked > 0:", *(f"    {line}" for line in step)]
         end = [f"{', '.join(kind.outputs)} = end({told})"]
         end += self._results(name for name in recorded if name not in inputs)
         lines += self._each([*end, *kind.geometry.after])
@@ -148,24 +154,24 @@ class KernelText:
             **{"ask": ask, "value_of": value_of, "slope_of": slope_of, "curves_at": curves_at},
         )
 
-    def _asking(self, part: Asked, law: str, known: dict[str, str], told: str, who: str = "") -> list[str]:
-        """Ask for the curves of a part, all forces or those who need it, and have its law answer."""
+    def _asking(self, part: Asked, known: Mapping[str, str]) -> list[str]:
+        """Ask for the curves of a part."""
         *_, curves = self.kind.terms
         places, number = {}, self.size - curves.size
         for name, term in zip(curves.type._fields, curves.terms, strict=True):  # type: ignore[attr-defined]
             places[name], number = number, number + term.size
-        asks = [
-            f"ask(lanes, asked + {k}, i[ITEM.NUMBERS] + {places[curve]}, {known[argument]})"
-            for k, (curve, argument) in enumerate(part.curves.items())
+        asks = enumerate(part.curves.items())
+        return [
+            *(f"ask(lanes, asked + {k}, i[ITEM.NUMBERS] + {places[curve]}, {known[at]})" for k, (curve, at) in asks),
+            f"asked += {len(part.curves)}",
         ]
-        kinds = ("value_of", "slope_of")[: 1 + part.slopes]
-        answers = ", ".join(f"{kind}(lanes, asked + {k})" for k in range(len(asks)) for kind in kinds)
-        taken = [f"{', '.join(known[name] for name in part.results)} = {law}({told}, {answers})"]
-        more, lines = f"asked += {len(asks)}", list[str]()
-        for group, after in ((asks, ["curves_at(x, lanes, asked)"]), (taken, [])):
-            own = [*group, more]
-            lines += ["asked = 0", *self._each([who, *(f"    {line}" for line in own)] if who else own), *after]
-        return lines
+
+    def _answering(self, part: Asked, law: str, known: Mapping[str, str], told: str) -> list[str]:
+        """Have the law of a part answer."""
+        kinds, count = ("value_of", "slope_of")[: 1 + part.slopes], len(part.curves)
+        answers = ", ".join(f"{kind}(lanes, answered + {k})" for k in range(count) for kind in kinds)
+        results = ", ".join(known[name] for name in part.results)
+        return [f"{results} = {law}({told}, {answers})", f"answered += {count}"]
 
     def _each(self, lines: Sequence[str]) -> list[str]:
         """Lines about each item of a run; who is told of an item without a solution is told its number."""
