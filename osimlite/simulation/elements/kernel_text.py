@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from osimlite.records import dataclass
 from osimlite.simulation.kernels import pointers
 from osimlite.simulation.kernels.condensation import WIDTH
-from osimlite.simulation.kernels.curves_abreast import LANES, ask, curves_at, slope_of, value_of
+from osimlite.simulation.kernels.curves_abreast import LANES, answer, ask, slope_of, value_of
 from osimlite.simulation.kernels.layout import ITEM, MODEL, OUTCOME, RUN, WORK
 from osimlite.simulation.kernels.table import ABREAST, EQUILIBRIUM, OFF, RESPONSE, RIGID
 
@@ -128,11 +128,11 @@ class KernelText:
         last[:] = [going, *(f"    {line}" for line in last)]
         lines = ["asked = 0", *self._each([*kind.geometry.before, *self._noted(inputs), begin, *asks[0]])]
         # Whoever has an answer asks for the next at once.
-        answer = ["curves_at(x, lanes, asked)", "asked = answered = 0"]
+        ready = ["answer(lanes, asked)", "asked = answered = 0"]
         for number, part in enumerate(made.parts):
-            lines += [*answer, *self._each([*self._answering(part, f"law_{number}", known, told), *asks[number + 1]])]
+            lines += [*ready, *self._each([*self._answering(part, f"law_{number}", known, told), *asks[number + 1]])]
         step = self._answering(made.search, "search", known, told)
-        step = [*answer, *self._each([going, *(f"    {line}" for line in (*step, *last))])]
+        step = [*ready, *self._each([going, *(f"    {line}" for line in (*step, *last))])]
         lines += ["while asked > 0:", *(f"    {line}" for line in step)]
         end = [f"{', '.join(kind.outputs)} = end({told})"]
         end += self._results(name for name in recorded if name not in inputs)
@@ -151,7 +151,7 @@ class KernelText:
             ],
             **scope,
             **{"known": made.known, "begin": made.begin, "search": made.search.law, "end": made.end},
-            **{"ask": ask, "value_of": value_of, "slope_of": slope_of, "curves_at": curves_at},
+            **{"ask": ask, "value_of": value_of, "slope_of": slope_of, "answer": answer},
         )
 
     def _asking(self, part: Asked, known: Mapping[str, str]) -> list[str]:
@@ -162,7 +162,7 @@ class KernelText:
             places[name], number = number, number + term.size
         asks = enumerate(part.curves.items())
         return [
-            *(f"ask(lanes, asked + {k}, i[ITEM.NUMBERS] + {places[curve]}, {known[at]})" for k, (curve, at) in asks),
+            *(f"ask(x, lanes, asked + {k}, i[ITEM.NUMBERS] + {places[curve]}, {known[at]})" for k, (curve, at) in asks),
             f"asked += {len(part.curves)}",
         ]
 
