@@ -24,35 +24,13 @@ NEVER = -1.0
 """A threshold that has no effect."""
 
 
-class Term(NamedTuple):
-    """A part of a reflex.
+class Part(NamedTuple):
+    """A term of a reflex, or a gate: a range of a coordinate, beyond which terms rest while it moves further."""
 
-    Attributes:
-        ints: as `TERM` of the kernels has them.
-        delay: s, of each candidate (w,).
-        gain, offset: (w,).
-    """
-
-    ints: tuple[int, ...]
-    delay: Array
-    gain: Array
-    offset: Array
-
-
-class Gate(NamedTuple):
-    """A range of a coordinate: terms rest while it is beyond and moves further.
-
-    Attributes:
-        sensor: number of that of its value.
-        speed: number of that of its speed.
-        delay, low, high: s, rad or m, of each candidate (w,).
-    """
-
-    sensor: int
-    speed: int
-    delay: Array
-    low: Array
-    high: Array
+    ints: tuple[int, ...]  # as the kernels have them
+    delay: Array  # s, as the next of each candidate (w,)
+    first: Array  # gain, or least value
+    second: Array  # offset, or largest value
 
 
 class Reflexes:
@@ -70,8 +48,8 @@ class Reflexes:
 
     def __init__(self, node: Node, kind: str, walkers: Walkers, parameters: Parameters) -> None:
         self.walkers, self.node = walkers, node
-        self._terms: list[Term] = []
-        self._gates: list[Gate] = []
+        self._terms: list[Part] = []
+        self._gates: list[Part] = []
         self._limits, self._swings_from_stance = np.zeros((walkers.count, LIMITS.HEAD)), False
         self._has_states, self._is_sided = kind == "GaitStateController", True
         if self._has_states:
@@ -81,7 +59,7 @@ class Reflexes:
             self.symmetric = node.flag("symmetric", False)
             self._is_sided = node.flag("dual_sided", True)
             for leg in (0, 1) if self._is_sided else (0,):
-                self._add_reflexes(node, parameters, "", leg, (True,) * len(STATES))
+                self._add_reflexes(node, parameters, "", leg, (1 << len(STATES)) - 1)
 
     def _read_states(self, node: Node, parameters: Parameters) -> None:
         parameters.auto = node.number("auto_std_factor", parameters.auto)
@@ -128,8 +106,8 @@ class Reflexes:
             for name in names:
                 if name not in STATES:
                     raise node.error(f"legs have no state '{name}'{or_known(name, STATES)}")
-            states = tuple(name in names for name in STATES)
-            prefix = "S" + "".join("1" if on else "0" for on in reversed(states)) + "."
+            states = sum(1 << STATES.index(name) for name in set(names))
+            prefix = f"S{states:05b}."
             for leg in range(len(SIDES)):
                 if side and side.lower() not in (SIDES[leg].strip("_"), ("left", "right")[leg]):
                     continue
@@ -137,9 +115,7 @@ class Reflexes:
                     self._add_reflexes(controller, parameters, prefix, leg, states)
         node.expect_all_asked("a ConditionalController")
 
-    def _add_reflexes(
-        self, node: Node, parameters: Parameters, prefix: str, leg: int, states: tuple[bool, ...]
-    ) -> None:
+    def _add_reflexes(self, node: Node, parameters: Parameters, prefix: str, leg: int, states: int) -> None:
         symmetric = node.flag("symmetric", self.symmetric)
         blocks = [node, *(block for _, block in node.all_of("Reflexes"))]
         for block in blocks:
@@ -178,7 +154,7 @@ class Reflexes:
         return self._named(node, target, self.walkers.names, leg), source, f"{prefix}{name}."
 
     def _muscle_reflex(
-        self, node: Node, parameters: Parameters, prefix: str, leg: int, states: tuple[bool, ...], symmetric: bool
+        self, node: Node, parameters: Parameters, prefix: str, leg: int, states: int, symmetric: bool
     ) -> None:
         target, source, before = self._begin(node, prefix, leg, symmetric)
         number = self._named(node, source, self.walkers.names, leg)
@@ -190,7 +166,8 @@ class Reflexes:
             free = node.flag(f"allow_neg_{kind}", negative)
             if np.any(gain != 0.0):
                 sensor = self.walkers.sensor(kind, number)
-                self._add(target, sensor, FREE if free else OF_SENSOR, leg, states, gate, delay, gain, offset)
+                term = target, sensor, FREE if free else OF_SENSOR, leg, states, gate
+                self._terms.append(Part(term, delay, gain, offset))
         self._constant(node, parameters, before, target, leg, states)
 
     def _gate(self, node: Node, parameters: Parameters, before: str, leg: int) -> int:
@@ -205,11 +182,11 @@ class Reflexes:
             parameters.of(node, f"pos_{end}", way, f"{start}pos_{end}") for end, way in (("min", -1e12), ("max", 1e12))
         )
         value, speed = (self.walkers.sensor(kind, number) for kind in ("DP", "DV"))
-        self._gates.append(Gate(value, speed, delay, low, high))
+        self._gates.append(Part((value, speed), delay, low, high))
         return len(self._gates) - 1
 
     def _coordinate_reflex(
-        self, node: Node, parameters: Parameters, prefix: str, leg: int, states: tuple[bool, ...], symmetric: bool
+        self, node: Node, parameters: Parameters, prefix: str, leg: int, states: int, symmetric: bool
     ) -> None:
         target, source, before = self._begin(node, prefix, leg, symmetric)
         number = self._named(node, source, self.walkers.coordinates, leg)
@@ -223,35 +200,25 @@ class Reflexes:
             free = node.flag(f"allow_neg_{kind}", True)
             if np.any(gain != 0.0):
                 place = self.walkers.sensor(sensor, number)
-                self._add(target, place, FREE if free else OF_RESULT, leg, states, -1, delay, -gain, offset)
+                term = target, place, FREE if free else OF_RESULT, leg, states, -1
+                self._terms.append(Part(term, delay, -gain, offset))
         self._constant(node, parameters, before, target, leg, states)
 
-    def _constant(
-        self, node: Node, parameters: Parameters, before: str, target: int, leg: int, states: tuple[bool, ...]
-    ) -> None:
+    def _constant(self, node: Node, parameters: Parameters, before: str, target: int, leg: int, states: int) -> None:
         constant = parameters.of(node, "C0", 0.0, f"{before}C0")
         if np.any(constant != 0.0):
             zero = np.zeros_like(constant)
-            self._add(target, -1, FREE, leg, states, -1, zero, constant, zero)
-
-    def _add(
-        self, target: int, sensor: int, kind: int, leg: int, states: tuple[bool, ...], gate: int, *numbers: Array
-    ) -> None:
-        bits = sum(is_on << number for number, is_on in enumerate(states))
-        self._terms.append(Term((target, sensor, kind, leg, bits, gate), *numbers))
+            self._terms.append(Part((target, -1, FREE, leg, states, -1), zero, constant, zero))
 
     def compiled(self) -> tuple[Ints, Array]:
         """What the kernels go by (see :mod:`osimlite.simulation.kernels.reflexes`): integers, and of each candidate the
         numbers (w, r)."""
         # What goes by sensors is added first.
-        terms = sorted(self._terms, key=lambda term: term.ints[TERM.SENSOR] < 0)
-        step, gates = self.walkers.step, self._gates
-        own = [(term.delay / step, term.gain, term.offset) for term in terms]
-        own += [(gate.delay / step, gate.low, gate.high) for gate in gates]
-        numbers = np.column_stack([self._limits, *(column for each in own for column in each)])
-        delays = [float(each[0].max()) for each in own]
-        kept = int(np.ceil(max([*delays, self._limits[0, LIMITS.DELAY]]))) + 2
-        head = len(terms), len(gates), kept, 0, self._has_states, self._swings_from_stance, 0, 0
-        ints = [*head, *(number for term in terms for number in term.ints)]
-        ints += [number for gate in gates for number in (gate.sensor, gate.speed)]
-        return np.array(ints, dtype=np.int64), np.ascontiguousarray(numbers)
+        parts = [*sorted(self._terms, key=lambda term: term.ints[TERM.SENSOR] < 0), *self._gates]
+        delays = [part.delay / self.walkers.step for part in parts]
+        each = [(delay, part.first, part.second) for delay, part in zip(delays, parts, strict=True)]
+        numbers = np.column_stack([self._limits, *(column for columns in each for column in columns)])
+        kept = int(np.ceil(max([*map(np.max, delays), self._limits[0, LIMITS.DELAY]]))) + 2
+        head = len(self._terms), len(self._gates), kept, 0, self._has_states, self._swings_from_stance, 0, 0
+        ints = np.array([*head, *(number for part in parts for number in part.ints)], dtype=np.int64)
+        return ints, np.ascontiguousarray(numbers)
