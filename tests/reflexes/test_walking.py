@@ -115,6 +115,7 @@ def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
         ("KV = 0.3", "KX = 0.3", "'KX' of a DofReflex is not done here"),
         ("ModelOpenSim4", "ModelHyfydy", "only ModelOpenSim4"),
         ("ReflexController", "FeedForwardController", "this has FeedForwardController"),
+        ("dual_sided = 0", "dual_sided = 0 NoiseController { base_noise = 0.1 }", "'NoiseController' of a Reflex"),
         ("dof = elbow", "dof = knee", "no coordinate 'knee'"),
         ("DofMeasure", "BodyMeasure", "a measure is needed"),
         ("max_duration = 1", "max_duration = long", "must be a number, not 'long'"),
