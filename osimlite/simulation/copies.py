@@ -55,7 +55,6 @@ class Copies:
         self.engine.drive(driven)
         self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
         self.places = self._places_of(driven)
-        self._step = step
         options = BatchOptions(to=step, accuracy=accuracy, integrator=integrator, step_bounds=(0.0, longest))
         options.check()
         self._batch = Batch(engine, np.tile(self.start, (count, 1)), options, start_holds=True)
@@ -110,9 +109,12 @@ class Copies:
                 said.append(self._batch.hold(law, room, numbers, *given, first, last))
 
         others = [] if self._pool is None else [self._pool.submit(share, *room) for room in self._rooms[1:]]
-        share(*self._rooms[0])
-        for other in others:
-            other.result()
+        try:
+            share(*self._rooms[0])
+        finally:
+            # Also after Ctrl-C nobody else works in the rooms.
+            for other in others:
+                other.result()
         return max(said)
 
     def close(self) -> None:
