@@ -168,9 +168,9 @@ class GaitMeasure(Measure):
         """As `Measure` says."""
         result, speeds, counts = np.ones(self.count), np.zeros(self.count), np.zeros(self.count)
         wanted = max(min(abs(self.low), abs(self.high)), self.least_speed)
-        for k, row in enumerate(self.walkers.noted[:, self._first :].tolist()):
-            count = int(row[GAIT_NOTED.COUNT])
-            numbers = row[GAIT_NOTED.STEPS : GAIT_NOTED.STEPS + 2 * count]
+        for k, room in enumerate(self.walkers.noted[:, self._first :]):
+            row = room[: GAIT_NOTED.STEPS + 2 * int(room[GAIT_NOTED.COUNT])].tolist()
+            numbers = row[GAIT_NOTED.STEPS :]
             # The last step ends with the walk.
             last = float(times[k]), row[GAIT_NOTED.HERE] - row[GAIT_NOTED.BEFORE]
             steps = [*zip(numbers[::2], numbers[1::2], strict=True), last]

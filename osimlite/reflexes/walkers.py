@@ -225,9 +225,10 @@ class Walkers:
         record = np.empty((max(order, 0), states.shape[1] + len(self.names) + len(self.legs)))
         chosen, before = range(self.count) if which is None else which, int(self.progress[0, STEPS])
         parts = *self._asked, self.rows, self.excitations, record, self.progress, order
-        status = self.copies.walk(chosen, *parts)
-        if status != OUTCOME.OK:
-            raise self.engine.refusal(status, 0.0, states[chosen[0]].tolist())
+        if self.copies.walk(chosen, *parts) != OUTCOME.OK:
+            # The engine tells what it is.
+            for k in chosen:
+                self.engine.applied(0.0, states[k].tolist())
         return record[: int(self.progress[0, STEPS]) - before] if order > 0 else record
 
     def loads(self) -> Array:

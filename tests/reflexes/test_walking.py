@@ -13,6 +13,7 @@ from osimlite.errors import OsimliteError
 from osimlite.models.walking import write_scenario
 from osimlite.reflexes.parameters import Parameters
 from osimlite.reflexes.scenario import Candidates, Scenario
+from osimlite.simulation.kernels.walks import FEEL
 from tests.conftest import ROOT
 
 ARM = """
@@ -191,3 +192,11 @@ def test_kernels_as_python_walk_likewise(ours, arm, monkeypatch) -> None:
             rows = getattr(walked, name).rows
             assert np.allclose(rows, getattr(expected, name).rows, rtol=1e-12, atol=1e-12)
         assert np.allclose(walked.results, expected.results, rtol=1e-11)
+
+
+def test_a_start_that_cannot_be_computed_is_told(ours) -> None:
+    candidates = Candidates(ours, Parameters(ours.best(), 2), 1.0)
+    walkers = candidates.walkers
+    walkers.copies.states[1, walkers.places["/forceset/vasti_l/fiber_length"]] = np.nan
+    with pytest.raises(OsimliteError, match="state of the motion is not finite"):
+        walkers.go(FEEL)
