@@ -17,8 +17,6 @@ Point = tuple[float, float, float]
 """x, y, and the slope there."""
 Numbers = tuple[float, ...]
 """Those of a curve."""
-Rising = tuple[float, float, float, float, float]
-"""Coefficients of a polynomial, from u on."""
 
 SECTIONS, FIRST, LAST = 0, 1, 4
 HEAD = 7
@@ -105,26 +103,13 @@ def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
         return c[FIRST + 1] + c[FIRST + 2] * (x - c[FIRST]), c[FIRST + 2]
     if x > c[LAST]:
         return c[LAST + 1] + c[LAST + 2] * (x - c[LAST]), c[LAST + 2]
-    k, u = place_on(c, x)
-    p, q = k + X, k + Y
-    of_x = c[p], c[p + 1], c[p + 2], c[p + 3], c[p + 4]
-    return on_section(u, of_x, c[q], (c[q + 1], c[q + 2], c[q + 3], c[q + 4], c[q + 5]))
-
-
-def place_on(c: Sequence[float], x: float) -> tuple[int, float]:
-    """The section of a curve that has x, by the place of its numbers, and u there: the root is unique."""
     k, rest, u = first_place(c, x)
-    p = k + X
-    of_x = c[p], c[p + 1], c[p + 2], c[p + 3], c[p + 4]
-    for _ in range(ROUNDS):
-        u, goes_on = nearer_place(u, rest, of_x)
-        if not goes_on:
-            break
-    return k, u
+    _, _, y, slope = on_section(c, k + X, 1, u, rest, ROUNDS)
+    return y, slope
 
 
 def first_place(c: Sequence[float], x: float) -> tuple[int, float, float]:
-    """The section that has x, how far that is from its first end, and u to begin the search from."""
+    """The section of a curve that has x, by the place of its numbers, how far x is from its start, and u, nearly."""
     count, number = int(c[SECTIONS]), 0
     while number < count - 1 and x >= c[HEAD + number]:
         number += 1
@@ -139,28 +124,39 @@ def first_place(c: Sequence[float], x: float) -> tuple[int, float, float]:
     return k, rest, u
 
 
-def nearer_place(u: float, rest: float, of_x: Rising) -> tuple[float, bool]:
-    """A step of Halley's search from u, and whether another is wanted; `of_x` are the coefficients of x from u on."""
-    a, b, d, e, f = of_x
-    # In halves, which a processor computes side by side.
-    v = u * u
-    off = u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
-    slope = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
-    bend = (b + u * (3.0 * d)) + v * (6.0 * e + u * (10.0 * f))
-    divisor = slope * slope - off * bend
-    leads_on = divisor > 0.0
-    step = off * slope / (divisor if leads_on else 1.0)
-    return min(max(u - step, 0.0), 1.0) if leads_on else u, leads_on and not abs(step) < NEAR
+def on_section(
+    c: Sequence[float], p: int, apart: int, u: float, rest: float, rounds: int
+) -> tuple[float, bool, float, float]:
+    """u after some steps of Halley's search for the only root, whether more are wanted, and y and the slope there.
 
-
-def on_section(u: float, of_x: Rising, y0: float, of_y: Rising) -> tuple[float, float]:
-    """y and the slope at u; the coefficients are those of x and y from u on, after y at the first end."""
-    a, b, d, e, f = of_x
-    g, h, i, j, k = of_y
-    v = u * u
+    Args:
+        c: where the coefficients of x and y are.
+        p: place of the first of these.
+        apart: how far the others are from one another.
+        u: where the search starts.
+        rest: how far x is from the start of the section.
+        rounds: steps at most.
+    """
+    a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
+    goes_on = True
+    for _ in range(rounds):
+        # In halves, which a processor computes side by side.
+        v = u * u
+        off = u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
+        run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
+        bend = (b + u * (3.0 * d)) + v * (6.0 * e + u * (10.0 * f))
+        divisor = run * run - off * bend
+        leads_on = divisor > 0.0
+        step = off * run / (divisor if leads_on else 1.0)
+        u = min(max(u - step, 0.0), 1.0) if leads_on else u
+        goes_on = leads_on and not abs(step) < NEAR
+        if not goes_on:
+            break
+    v, q = u * u, p + 5 * apart
+    g, h, i, j, k, m = c[q], c[q + apart], c[q + 2 * apart], c[q + 3 * apart], c[q + 4 * apart], c[q + 5 * apart]
     run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
-    rise = (g + u * (2.0 * h)) + v * ((3.0 * i + u * (4.0 * j)) + v * (5.0 * k))
-    return (y0 + u * g) + v * ((h + u * i) + v * (j + u * k)), rise / run
+    rise = (h + u * (2.0 * i)) + v * ((3.0 * j + u * (4.0 * k)) + v * (5.0 * m))
+    return u, goes_on, (g + u * h) + v * ((i + u * j) + v * (k + u * m)), rise / run
 
 
 def curve_integral(c: Sequence[float], x: float) -> float:
@@ -168,7 +164,8 @@ def curve_integral(c: Sequence[float], x: float) -> float:
     total, off = 0.0, x - c[FIRST]
     if off <= 0.0:
         return (c[FIRST + 1] + 0.5 * c[FIRST + 2] * off) * off
-    at, u = place_on(c, min(x, c[LAST]))
+    at, rest, u = first_place(c, min(x, c[LAST]))
+    u, *_ = on_section(c, at + X, 1, u, rest, ROUNDS)
     for k in range(HEAD + int(c[SECTIONS]), at, SECTION):
         total += _area(c, k, 1.0)
     total += _area(c, at, u)

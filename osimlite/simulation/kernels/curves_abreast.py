@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from osimlite.forces.bezier import FIRST, LAST, ROUNDS, Rising, X, first_place, nearer_place, on_section
+from osimlite.forces.bezier import FIRST, LAST, ROUNDS, STARTS, X, first_place, on_section
 from osimlite.simulation.kernels.pointers import Floats, at
 
 LANES = 64
 """So many can be asked at once."""
-VALUE, SLOPE, INSIDE, GOES_ON, REST, U, OF_X, AT_START, OF_Y, ROWS = 0, 1, 2, 3, 4, 5, 6, 11, 12, 17
+COEFFICIENTS = STARTS - X
+VALUE, SLOPE, INSIDE, GOES_ON, REST, U, OF_X, ROWS = 0, 1, 2, 3, 4, 5, 6, 6 + COEFFICIENTS
 """Rows of the room, each of LANES numbers: the answer; 0 where the argument is outside of the curve, and the answer
 there at once; whether the search has to go on, how far the argument is from the start of its section, the place on
 that, and its coefficients."""
@@ -30,9 +31,9 @@ def ask(x: Floats, room: Floats, number: int, place: int, z: float) -> None:
         lane[LANES * INSIDE] = lane[LANES * REST] = lane[LANES * U] = 0.0
         lane[LANES * OF_X] = 1.0
         return
-    section, lane[LANES * REST], lane[LANES * U] = first_place(c, z)
-    lane[LANES * INSIDE] = 1.0
-    for k in range(11):
+    section, rest, u = first_place(c, z)
+    lane[LANES * INSIDE], lane[LANES * REST], lane[LANES * U] = 1.0, rest, u
+    for k in range(COEFFICIENTS):
         lane[LANES * (OF_X + k)] = c[section + X + k]
 
 
@@ -46,34 +47,20 @@ def slope_of(room: Floats, number: int) -> float:
     return room[LANES * SLOPE + number]
 
 
-def answer(room: Floats, asked: int) -> None:
+def answer(room: Any, asked: int) -> None:
     """Answer all that was asked."""
-    for number in range(asked):
-        lane = at(room, number)
-        place, goes_on = nearer_place(lane[LANES * U], lane[LANES * REST], rising(lane, OF_X))
-        lane[LANES * U], lane[LANES * GOES_ON] = place, 1.0 if goes_on else 0.0
-    for number in range(asked):
-        lane = at(room, number)
-        rounds = 1
-        while lane[LANES * GOES_ON] > 0.0 and rounds < ROUNDS:
-            place, goes_on = nearer_place(lane[LANES * U], lane[LANES * REST], rising(lane, OF_X))
-            lane[LANES * U], lane[LANES * GOES_ON] = place, 1.0 if goes_on else 0.0
-            rounds += 1
-    for number in range(asked):
-        lane = at(room, number)
-        start = lane[LANES * AT_START]
-        value, slope = on_section(lane[LANES * U], rising(lane, OF_X), start, rising(lane, OF_Y))
-        is_inside = lane[LANES * INSIDE] > 0.0
-        lane[LANES * VALUE] = value if is_inside else lane[LANES * VALUE]
-        lane[LANES * SLOPE] = slope if is_inside else lane[LANES * SLOPE]
+    for lane in range(asked):
+        search(room, lane, 1)
+    for lane in range(asked):
+        if room[LANES * GOES_ON + lane] > 0.0:
+            search(room, lane, ROUNDS - 1)
 
 
-def rising(lane: Floats, row: int) -> Rising:
-    """Coefficients of a lane."""
-    return (
-        lane[LANES * row],
-        lane[LANES * (row + 1)],
-        lane[LANES * (row + 2)],
-        lane[LANES * (row + 3)],
-        lane[LANES * (row + 4)],
-    )
+def search(room: Any, lane: int, rounds: int) -> None:
+    """Some steps of a search at most."""
+    u, rest = room[LANES * U + lane], room[LANES * REST + lane]
+    u, goes_on, value, slope = on_section(room, LANES * OF_X + lane, LANES, u, rest, rounds)
+    is_inside = room[LANES * INSIDE + lane] > 0.0
+    room[LANES * U + lane], room[LANES * GOES_ON + lane] = u, 1.0 if goes_on else 0.0
+    room[LANES * VALUE + lane] = value if is_inside else room[LANES * VALUE + lane]
+    room[LANES * SLOPE + lane] = slope if is_inside else room[LANES * SLOPE + lane]
