@@ -109,7 +109,7 @@ def test_a_report_shows_what_was_found(walk):
     )
     assert near is not None
     # On so coarse a mesh for a while.
-    assert 0.1 < float(near[1]) <= float(near[2]) == pytest.approx(found.states.times[-1], rel=1e-3)
+    assert 0.03 < float(near[1]) <= float(near[2]) == pytest.approx(found.states.times[-1], rel=1e-3)
     page = osimlite.report({file: outcome}, folder / "page.html").read_text(encoding="utf-8")
     assert [title for title in re.findall("<h2>(.+?)</h2>", page) if title != "Joint angles"] == [
         "Controls",
