@@ -248,7 +248,7 @@ def test_kernels_as_python_walk_likewise(ours, arm, monkeypatch) -> None:
     """Where a place outside an array is an error."""
     from tests.simulation.checked import Checked
 
-    for file, seconds in ((ours.path, ours.step), (arm, 0.02)):
+    for file, seconds in ((ours.folder / "human-walks.scone", ours.step), (arm, 0.02)):
         compiled = Scenario(file)
         expected = compiled.walk(compiled.best(), duration=seconds)
         with monkeypatch.context() as patched:
