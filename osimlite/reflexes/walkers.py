@@ -48,6 +48,10 @@ class Leg(NamedTuple):
     length: float
 
 
+LAGGING = "euler2", "merson"
+"""Integrators whose control steps begin with the derivative that the one before has ended with."""
+
+
 class Walkers:
     """Candidates of a model.
 
@@ -88,6 +92,8 @@ class Walkers:
         longest: float = inf,
     ) -> None:
         self.count, self.step = count, step
+        # As SCONE does it, with the integrators that it has.
+        self._lags = integrator in LAGGING
         self.copies = Copies(model, count, step, accuracy, integrator, longest)
         self.engine: Any = self.copies.engine
         self.mechanism = self.copies.simulation.mechanism
@@ -138,7 +144,7 @@ class Walkers:
             centres.append(frame[:3, :3] @ body.mass_properties.center + frame[:3, 3])
         masses = np.array([body.mass_properties.mass for body in bodies])
         own = (
-            [self.weight, masses.sum(), self.step],
+            [self.weight, masses.sum(), self.step, float(self._lags)],
             self.optimal,
             self.strengths,
             self.least,

@@ -35,7 +35,8 @@ def test_the_walk_is_opensim_s(tmp_path) -> None:
         brain.addActuator(model.getMuscles().get(label))
         function = opensim.PiecewiseConstantFunction()
         for row, value in enumerate(walked.excitations[label][:steps].tolist()):
-            function.addPoint(row * scenario.step - 1e-12, value)
+            # As in SCONE, the derivative at the start of a step does not know of it.
+            function.addPoint(row * scenario.step + 1e-12, value)
         brain.prescribeControlForActuator(label, function)
     state = model.initSystem()
     put(0)

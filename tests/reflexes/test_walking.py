@@ -238,10 +238,14 @@ def test_scone_s_human_walks_twenty_seconds() -> None:
             break
     else:
         pytest.skip("needs the sources of scone-core, which are not beside this repository")
-    scenario = Scenario(file)
-    walked = scenario.walk(scenario.best())
-    assert walked.times[0] == 20.0 and walked.terms["Gait"][0] == 0.0
-    assert 1.0 < walked.report["speed"][0] < 1.06 and 34 <= walked.report["steps"][0] <= 38
+    scenario, count, rng = Scenario(file), 16, np.random.default_rng(0)
+    # Contact makes of rounding another walk: some of these fall, on whatever processor.
+    values = {name: best * (1.0 + 1e-7 * rng.normal(size=count)) for name, best in scenario.best().items()}
+    walked = scenario.walk(values, count)
+    whole = walked.times == 20.0
+    assert whole.sum() >= count // 3 and (walked.terms["Gait"][whole] == 0.0).all()
+    speeds, steps = (walked.report[name][whole] for name in ("speed", "steps"))
+    assert speeds.min() > 1.0 and speeds.max() < 1.06 and steps.min() >= 34 and steps.max() <= 38
 
 
 def test_kernels_as_python_walk_likewise(ours, arm, monkeypatch) -> None:

@@ -97,12 +97,15 @@ def run_several(
             watches,
             levels,
         )
-        endings[k] = run(m, at(states, k * size))
+        endings[k] = run(m, at(states, k * size), False)
     return OUTCOME.OK
 
 
-def run(m: Motion, y: Floats) -> int:
-    """Go on from the state y, which is changed, until something ends the run."""
+def run(m: Motion, y: Floats, is_going: bool) -> int:
+    """Go on from the state y, which is changed, until something ends the run.
+
+    Its derivative is that at the end of the run before if that goes on.
+    """
     s, counts, clock, sizes = m.s, m.counts, m.clock, m.sizes
     size = s[MODEL.STATE_SIZE]
     room, h = at(m.w, s[MODEL.WORK_STATE]), at(m.w, sizes[METHOD_AT])
@@ -113,9 +116,9 @@ def run(m: Motion, y: Floats) -> int:
     if not is_kept and not projected(s, m.x, m.w, clock[0], y, f0, 0, h[ACCEPTED] / 10.0, inf):
         return FAILED
     copy(size, y, y0)
-    status = evaluated(m, clock[0], y0, f0, STAGE.ACCELERATION)
+    status = OUTCOME.OK if is_going else evaluated(m, clock[0], y0, f0, STAGE.ACCELERATION)
     if counts[TAKEN] == 0 and counts[EVALUATIONS] == 0:
-        counts[EVALUATIONS], h[MEMORY] = 1, 0.0
+        counts[EVALUATIONS], h[MEMORY] = 0 if is_going else 1, 0.0
     if status != OUTCOME.OK or not is_finite(size, f0):
         return FAILED
     levels_at(m, y0, before)
@@ -166,6 +169,7 @@ def run(m: Motion, y: Floats) -> int:
         y0, y1 = y1, y0
         f0, f1 = f1, f0
         copy(size, y0, y)
+    copy(size, f0, at(room, size))
     return DONE
 
 

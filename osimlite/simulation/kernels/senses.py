@@ -31,9 +31,9 @@ class SENSES(metaclass=Record):
 
 
 class SENSED(metaclass=Record):
-    """Weight (N), mass (kg), for how long controls are held (s)."""
+    """Weight (N), mass (kg), for how long controls are held (s), 1 if steps begin with the derivative before them."""
 
-    WEIGHT, MASS, STEP, HEAD = range(4)
+    WEIGHT, MASS, STEP, LAGS, HEAD = range(5)
 
 
 def feel(s: Ints, w: Floats, y: Floats, i: Ints, p: Floats, row: Floats) -> None:

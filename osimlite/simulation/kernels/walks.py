@@ -69,7 +69,7 @@ def hold_several(
         for number in range(held_by):
             x[places[number]] = controls[held_by * k + number]
         m = motion_of(s, x, w, sizes, clocks, counts, peaks, places, k)
-        going[k] = 1 if held(m, at(states, s[MODEL.STATE_SIZE] * k)) else 0
+        going[k] = 1 if held(m, at(states, s[MODEL.STATE_SIZE] * k), False) else 0
     return OUTCOME.OK
 
 
@@ -82,12 +82,12 @@ def motion_of(
     return Motion(s, x, w, sizes, clock, count, peak, peak, peak, peak, peak, peak, unused, peak)
 
 
-def held(m: Motion, y: Floats) -> bool:
+def held(m: Motion, y: Floats, is_going: bool) -> bool:
     """Whether a state has gone on to the end of a control step. Each is a run of its own: no method knows what was."""
     m.clock[0] = 0.0
     for k in range(COUNTED):
         m.counts[k] = 0
-    return run(m, y) == DONE and is_finite(m.s[MODEL.STATE_SIZE], y)
+    return run(m, y, is_going) == DONE and is_finite(m.s[MODEL.STATE_SIZE], y)
 
 
 def walk_several(
@@ -169,9 +169,17 @@ def begun(a: Walk, y: Floats, order: int) -> int:
 
 
 def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
-    """So many control steps at most."""
-    m, progress = a.m, a.progress
+    """So many control steps at most.
+
+    As in SCONE each can begin with the derivative that the one before has ended with, which knows its excitations only.
+    """
+    m, progress, lags = a.m, a.progress, a.known[SENSED.LAGS] > 0.0
     size, muscles = m.s[MODEL.STATE_SIZE], a.senses[SENSES.MUSCLES]
+    if lags:
+        hold(a)
+        before = at(m.w, m.s[MODEL.WORK_STATE])
+        copy(size, y, before)
+        evaluated(m, a.known[SENSED.STEP], before, at(before, size), STAGE.ACCELERATION)
     for number in range(steps):
         if progress[GOING] == 0:
             return
@@ -181,9 +189,8 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
             copy(size, y, record)
             copy(muscles, a.excitations, at(record, size))
             copy(a.senses[SENSES.LEGS], at(a.row, a.senses[SENSES.LOADS]), at(record, size + muscles))
-        for k in range(muscles):
-            m.x[a.muscles[k]] = a.excitations[k]
-        goes_on = held(m, y)
+        hold(a)
+        goes_on = held(m, y, lags)
         progress[STEPS] += 1
         progress[FORCES] += m.counts[EVALUATIONS]
         if not goes_on:
@@ -201,6 +208,12 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
             a.senses, a.known, a.criteria, a.bounds, t, a.row, active, y, a.excitations, judged_room(a)
         ):  # fmt: skip
             progress[GOING] = 0
+
+
+def hold(a: Walk) -> None:
+    """Give the muscles the excitations."""
+    for k in range(a.senses[SENSES.MUSCLES]):
+        a.m.x[a.muscles[k]] = a.excitations[k]
 
 
 def judged_room(a: Walk) -> Floats:
