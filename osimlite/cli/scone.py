@@ -56,6 +56,7 @@ def scone(
     Example: osimlite scone human-walks -o walk
     """
     from osimlite.cli._console import Facts, show
+    from osimlite.errors import SettingError
     from osimlite.files import make_folder
     from osimlite.models.walking import SCENARIO, write_scenario
     from osimlite.reflexes.parameters import read_par
@@ -63,6 +64,8 @@ def scone(
     from osimlite.reflexes.search import BEST, search
     from osimlite.simulation.files.storage import write_sto
 
+    if not optimize and (resume or not generations is population is seed is None):
+        raise SettingError("--generations, --population, --seed and --resume say how to search; add --optimize")
     if str(scenario) == SCENARIO:
         scenario = write_scenario(output)
     given = Scenario(scenario)

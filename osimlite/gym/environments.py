@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any
 
 import gymnasium
@@ -11,7 +12,9 @@ from gymnasium.vector import AutoresetMode
 
 from osimlite.gym.tasks import TASKS, Seen, Task, of_model
 from osimlite.multibody.spatial import Array
+from osimlite.records import replace
 from osimlite.simulation.copies import Copies
+from osimlite.text import did_you_mean, or_known
 
 FAR = 1e6
 """No observation is larger; what is not finite ends an episode."""
@@ -35,6 +38,10 @@ class _Observed:
             *(info.name for info in order), *(f"{info.name}/speed" for info in order),
             *("/".join(path.split("/")[-2:]) for path in simulation.state.paths),
         ]  # fmt: skip
+        for name in task.hidden:
+            if name not in self.shown:
+                near = did_you_mean(name, self.shown)
+                raise gymnasium.error.Error(f"nothing is called '{name}' that could be hidden{near}")
         self._visible = [k for k, name in enumerate(self.shown) if name not in task.hidden]
         self.labels = tuple(self.shown[k] for k in self._visible)
         paths = self.copies.controls
@@ -64,7 +71,10 @@ class _Observed:
 
     def step(self, actions: Any) -> tuple[Array, Any]:
         """Rewards (w,) and which copies have failed (w,)."""
-        controls = np.clip(np.asarray(actions, dtype=float), *self._limits)
+        given = np.asarray(actions, dtype=float)
+        if given.shape != (wanted := (self.count, len(self.copies.controls))):
+            raise gymnasium.error.InvalidAction(f"actions have the shape {wanted}, not {given.shape}")
+        controls = np.clip(given, *self._limits)
         before = self.seen(controls)
         going = self.copies.step(controls)
         after = self.seen(controls)
@@ -81,11 +91,24 @@ class _Observed:
 
 
 def _task(task: Task | Callable[[], Task] | None, model: Any, reward: Any, choices: dict[str, Any]) -> Task:
+    known = [field.name for field in fields(Task) if field.name not in ("model", "reward")]
+    for name in choices:
+        if name not in known:
+            raise gymnasium.error.Error(f"a task has no '{name}'{or_known(name, known)}")
     if task is not None:
-        return task if isinstance(task, Task) else task()
+        if model is not None:
+            raise gymnasium.error.Error("this environment has its model; take osimlite/Model-v0 for another")
+        made = task if isinstance(task, Task) else task()
+        return replace(made, **choices, **({} if reward is None else {"reward": reward}))
     if model is None or reward is None:
         raise gymnasium.error.Error("give a task, or a model and a reward(before, after)")
     return of_model(model, reward, **choices)
+
+
+def _mode(mode: str | None) -> str | None:
+    if mode not in (None, "rgb_array"):
+        raise gymnasium.error.UnsupportedMode(f"pictures come as 'rgb_array', not as '{mode}'")
+    return mode
 
 
 class MuscleEnv(gymnasium.Env[Any, Any]):
@@ -115,7 +138,7 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
         **choices: Any,
     ) -> None:
         self._all = _Observed(_task(task, model, reward, choices), 1)
-        self.render_mode = render_mode
+        self.render_mode = _mode(render_mode)
         self.observation_space, self.action_space = self._all.observations, self._all.actions
         self.labels, self.controls = self._all.labels, self._all.copies.controls
         self._steps = 0
@@ -164,7 +187,7 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         render_mode: str | None = None,
         **choices: Any,
     ) -> None:
-        self.num_envs, self.render_mode = num_envs, render_mode
+        self.num_envs, self.render_mode = num_envs, _mode(render_mode)
         self._all = _Observed(_task(task, model, reward, choices), num_envs)
         self.single_observation_space, self.single_action_space = self._all.observations, self._all.actions
         batch = gymnasium.vector.utils.batch_space

@@ -19,6 +19,7 @@ from osimlite.text import or_known
 
 STATES = "EarlyStance", "LateStance", "Liftoff", "Swing", "Landing"
 CONTROLLERS = "GaitStateController", "ReflexController"
+KINDS = "MuscleReflex", "ConditionalMuscleReflex", "DofReflex"
 """What is done here."""
 NEVER = -1.0
 """A threshold that has no effect."""
@@ -119,18 +120,21 @@ class Reflexes:
         symmetric = node.flag("symmetric", self.symmetric)
         blocks = [node, *(block for _, block in node.all_of("Reflexes"))]
         for block in blocks:
-            for kind, reflex in block.all_of("MuscleReflex", "ConditionalMuscleReflex", "DofReflex"):
+            for kind, reflex in block.all_of(*KINDS):
                 make = self._coordinate_reflex if kind == "DofReflex" else self._muscle_reflex
                 make(reflex, parameters, prefix, leg, states, symmetric)
                 reflex.expect_all_asked(f"a {kind}")
             block.expect_all_asked("a ReflexController")
+        if not any(kind in KINDS for block in blocks for kind, _ in block.parts):
+            raise node.error("a ReflexController needs reflexes")
 
     def _named(self, node: Node, name: str, names: list[str], leg: int) -> int:
         """The number of what has a name, with or without the side of a leg."""
-        for full in (name, name + SIDES[leg]):
+        for full in (name, name + SIDES[leg]) if self._is_sided else (name,):
             if full in names:
                 return names.index(full)
-        raise node.error(f"the model has no '{name}' or '{name}{SIDES[leg]}'{or_known(name, names)}")
+        beside = f" or '{name}{SIDES[leg]}'" if self._is_sided else ""
+        raise node.error(f"the model has no '{name}'{beside}{or_known(name, names)}")
 
     def _begin(self, node: Node, prefix: str, leg: int, symmetric: bool) -> tuple[int, str, str]:
         """Target, name of the source, and what stands before the names of parameters."""
@@ -153,12 +157,19 @@ class Reflexes:
         name = named(own) if own else first if first == second else f"{first}-{second}"
         return self._named(node, target, self.walkers.names, leg), source, f"{prefix}{name}."
 
+    @staticmethod
+    def _delay(node: Node, parameters: Parameters, before: str) -> Array:
+        delay = parameters.of(node, "delay", 0.0, before + "delay")
+        if np.any(delay < 0.0):
+            raise node.error(f"a delay of {delay.min():g} s knows what is to come")
+        return delay
+
     def _muscle_reflex(
         self, node: Node, parameters: Parameters, prefix: str, leg: int, states: int, symmetric: bool
     ) -> None:
         target, source, before = self._begin(node, prefix, leg, symmetric)
         number = self._named(node, source, self.walkers.names, leg)
-        delay = parameters.of(node, "delay", 0.0, before + "delay")
+        delay = self._delay(node, parameters, before)
         gate = self._gate(node, parameters, before, leg)
         for kind, rest, negative in (("L", 1.0, True), ("V", 0.0, False), ("F", 0.0, True)):
             gain = parameters.of(node, f"K{kind}", 0.0, f"{before}K{kind}")
@@ -177,7 +188,7 @@ class Reflexes:
         name = node.text("dof")
         number = self._named(node, name, self.walkers.coordinates, leg)
         start = f"{before[:-1]}-{name}."
-        delay = parameters.of(node, "delay", 0.0, start + "delay")
+        delay = self._delay(node, parameters, start)
         low, high = (
             parameters.of(node, f"pos_{end}", way, f"{start}pos_{end}") for end, way in (("min", -1e12), ("max", 1e12))
         )
@@ -189,11 +200,13 @@ class Reflexes:
         self, node: Node, parameters: Parameters, prefix: str, leg: int, states: int, symmetric: bool
     ) -> None:
         target, source, before = self._begin(node, prefix, leg, symmetric)
+        if node.get("source") is None:
+            raise node.error("'source', a coordinate, is missing")
         number = self._named(node, source, self.walkers.coordinates, leg)
         for key in ("source_parent", "mirror_left", "KA"):
             if node.get(key) is not None:
                 raise node.error(f"'{key}' of a DofReflex is not done here")
-        delay = parameters.of(node, "delay", 0.0, before + "delay")
+        delay = self._delay(node, parameters, before)
         for kind, sensor in (("P", "DP"), ("V", "DV")):
             offset = parameters.of(node, f"{kind}0", 0.0, f"{before}{kind}0")
             gain = parameters.of(node, f"K{kind}", 0.0, f"{before}K{kind}")

@@ -230,6 +230,8 @@ class Penalty(Measure):
     def penalize(self, node: Node, kind: int, place: int = 0, factor: float = 1.0) -> None:
         """Ask for a number; `node` says how it is punished."""
         numbers = [factor, node.number("min", -inf), node.number("max", inf)]
+        if numbers[1] > numbers[2]:
+            raise node.error(f"from {numbers[1]:g} to {numbers[2]:g} there is no value")
         numbers.append(node.number("abs_penalty", node.number("abs_range_penalty", 0.0)))
         numbers.append(node.number("squared_penalty", node.number("squared_range_penalty", 0.0)))
         mode = node.text("mode", "average")

@@ -69,7 +69,7 @@ class Parameters:
         if part.parts:
             mean, std = part.number("mean"), part.number("std", np.nan)
             low, high = part.number("min", -np.inf), part.number("max", np.inf)
-            return self._asked(name or key, mean, std, low, high)
+            return self._asked(part, name or key, mean, std, low, high)
         return self.read(part, name or key)
 
     def read(self, part: Node, name: str) -> Array:
@@ -88,9 +88,11 @@ class Parameters:
         low, high = (
             float(match[end]) if match[end] is not None else way for end, way in (("low", -np.inf), ("high", np.inf))
         )
-        return self._asked(name, float(mean), np.nan if std is None else float(std), low, high)
+        return self._asked(part, name, float(mean), np.nan if std is None else float(std), low, high)
 
-    def _asked(self, name: str, mean: float, std: float, low: float, high: float) -> Array:
+    def _asked(self, part: Node, name: str, mean: float, std: float, low: float, high: float) -> Array:
+        if not low <= mean <= high:
+            raise part.error(f"the parameter '{name}' begins at {mean:g}, which is not from {low:g} to {high:g}")
         std = self.auto * abs(mean) if np.isnan(std) else std
         self.found.setdefault(name, Parameter(name, mean, std, low, high))
         value = self.values.get(name, mean)

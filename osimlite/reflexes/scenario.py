@@ -102,6 +102,8 @@ class Scenario:
             raise self.optimizer.error("a scenario needs a SimulationObjective in a CmaOptimizer")
         self._objective = objective
         self.duration = objective.number("max_duration", 1e3)
+        if not self.duration > 0.0:
+            raise objective.error(f"a walk of {self.duration:g} s is none; max_duration is to be positive")
         settings = objective.get("ModelOpenSim4")
         if settings is None:
             other = next((name for name, _ in objective.parts if name.startswith("Model")), "no model")
@@ -189,7 +191,15 @@ class Scenario:
         """
         if duration is not None and not duration >= self.step:
             raise SettingError(f"a walk of {duration:g} s is shorter than a control step of {self.step:g} s")
-        return Candidates(self, Parameters(values, count), self.duration if duration is None else duration).walk()
+        parameters = Parameters(values, count)
+        for name, value in values.items():
+            if np.shape(value) not in ((), (count,)):
+                raise SettingError(f"'{name}' has {np.size(value)} values for {count} candidates")
+        candidates = Candidates(self, parameters, self.duration if duration is None else duration)
+        for name in values:
+            if name not in parameters.found and name not in self.begun:
+                raise SettingError(f"the scenario has no parameter '{name}'{or_known(name, parameters.found)}")
+        return candidates.walk()
 
     def walkers(self, count: int) -> Walkers:
         """So many walkers of the model; kept, as making them takes longer than a walk."""

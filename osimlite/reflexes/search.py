@@ -70,7 +70,7 @@ def search(
 
     Raises:
         MissingDependency: cma is not installed.
-        SettingError: nothing is looked for, or there are too few candidates.
+        SettingError: nothing is looked for, there are too few candidates, or the folder has the best of another search.
     """
     generations = scenario.generations if generations is None else generations
     population = scenario.population if population is None else population
@@ -82,19 +82,26 @@ def search(
     if not own:
         raise SettingError("the scenario has no parameters, which are written as 1~0.1<0,2>")
     path = Path(folder) / BEST
+    if not resume and path.exists():
+        raise SettingError(f"'{path}' is there already: go on with it (--resume), or take another folder")
+    best, least = np.array([each.mean for each in own]), np.inf
     if resume:
         known = read_par(path)
+        # As it was written there, a mean can be beyond the bounds of now.
         own = [
-            each._replace(mean=known[each.name][1], std=known[each.name][2]) if each.name in known else each
+            each._replace(mean=float(np.clip(known[each.name][1], each.low, each.high)), std=known[each.name][2])
+            if each.name in known
+            else each
             for each in own
         ]
+        best = np.array([known[each.name][0] if each.name in known else each.mean for each in own])
+        least = float(scenario.walk({each.name: value for each, value in zip(own, best, strict=True)}).results[0])
     make_folder(Path(folder))
     scale = np.array([each.std if each.std > 0.0 else 1e-6 for each in own])
     middle = np.array([each.mean for each in own])
     lows, highs = ((np.array([getattr(each, end) for each in own]) - middle) / scale for end in ("low", "high"))
     options = {"bounds": [lows, highs], "popsize": population, "seed": seed + 1, "verbose": -9}
     es = strategy.CMAEvolutionStrategy(np.zeros(len(own)), 1.0, options)
-    best, least = middle.copy(), np.inf
     begin = time.perf_counter()
     try:
         for number in range(1, generations + 1):
@@ -105,7 +112,8 @@ def search(
             place = int(np.argmin(walked.results))
             if walked.results[place] < least:
                 best, least = values[place], float(walked.results[place])
-                write_par(path, own, best, middle + scale * es.mean, scale * es.sigma * np.sqrt(np.diag(es.C)))
+                mean = middle + scale * es.result.xfavorite
+                write_par(path, own, best, mean, scale * es.sigma * np.sqrt(np.diag(es.C)))
             if tell is not None:
                 rate = 60.0 * number / (time.perf_counter() - begin)
                 tell(Generation(number, least, float(np.median(walked.results)), float(walked.times.max()), rate))
@@ -124,5 +132,5 @@ def write_par(path: Path, parameters: list[Parameter], best: Array, mean: Array,
     """
     with written_atomically(path) as stream:
         for each, *numbers in zip(parameters, best, mean, std, strict=True):
-            line = "\t".join(f"{number:.9g}" for number in numbers)
+            line = "\t".join(f"{number:.17g}" for number in numbers)
             stream.write(f"{each.name:<32}\t{line}\n".encode())

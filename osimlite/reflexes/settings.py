@@ -16,6 +16,7 @@ from osimlite.records import dataclass, field
 from osimlite.text import did_you_mean
 
 _TOKEN = re.compile(r'\s+|#[^\n]*|(?P<token>"[^"]*"|<<|>>|[{}=\[\]]|[^\s{}=\[\]#"]+)')
+FLAGS = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
 _MOST_DEEP = 20
 """Files that may include one another."""
 
@@ -38,9 +39,16 @@ class Node:
     asked: set[str] = field(default_factory=set)
 
     def get(self, key: str) -> Node | None:
-        """The first part of a name."""
+        """The part of a name.
+
+        Raises:
+            DocumentError: there are several.
+        """
         self.asked.add(key)
-        return next((node for name, node in self.parts if name == key), None)
+        found = [node for name, node in self.parts if name == key]
+        if len(found) > 1:
+            raise found[1].error(f"'{key}' stands here again; it counts once only")
+        return found[0] if found else None
 
     def text(self, key: str, otherwise: str | None = None) -> str:
         """The value of a part.
@@ -71,8 +79,15 @@ class Node:
             raise (found or self).error(f"'{key}' must be a number, not '{text}'") from None
 
     def flag(self, key: str, otherwise: bool) -> bool:
-        """Whether a part is 1 or true."""
-        return self.text(key, "1" if otherwise else "0").lower() in ("1", "true", "yes")
+        """Whether a part is 1 or true.
+
+        Raises:
+            DocumentError: it is neither that nor 0 or false.
+        """
+        text = self.text(key, "1" if otherwise else "0")
+        if text.lower() not in FLAGS:
+            raise (self.get(key) or self).error(f"'{key}' must be 0 or 1, not '{text}'")
+        return FLAGS[text.lower()]
 
     def all_of(self, *names: str) -> Iterator[tuple[str, Node]]:
         """The parts of some names, in their order."""

@@ -112,3 +112,27 @@ def test_any_model_has_a_task(tmp_path) -> None:
         gymnasium.make("osimlite/Model-v0", model=furthest_walker(), reward=lambda before, after: 0.0)
     with pytest.raises(gymnasium.error.Error, match="give a task"):
         gymnasium.make("osimlite/Model-v0")
+
+
+@pytest.mark.parametrize(
+    ("choices", "words"),
+    [
+        ({"secnods": 1.0}, "a task has no 'secnods'.*did you mean 'seconds'"),
+        ({"render_mode": "human"}, "pictures come as 'rgb_array', not as 'human'"),
+        ({"hidden": ("shoulder",)}, "nothing is called 'shoulder' that could be hidden"),
+        ({"model": "arm.osim"}, "this environment has its model"),
+    ],
+)
+def test_what_an_environment_does_not_know_is_refused(choices, words) -> None:
+    with pytest.raises(gymnasium.error.Error, match=words):
+        gymnasium.make("osimlite/Arm-v0", **choices).unwrapped.close()
+
+
+def test_a_task_can_be_another_in_parts() -> None:
+    env = gymnasium.make("osimlite/Arm-v0", seconds=0.02, reward=lambda before, after: np.full(1, 7.0)).unwrapped
+    env.reset(seed=0)
+    action = np.zeros(env.action_space.shape)
+    assert env.step(action)[1] == 7.0 and env.step(action)[3]
+    with pytest.raises(gymnasium.error.InvalidAction, match=r"actions have the shape \(1, 2\), not \(1, 3\)"):
+        env.step(np.zeros(3))
+    env.close()

@@ -106,8 +106,23 @@ def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
     assert len(seen) == 8 and seen[-1].best < 0.5 * before
     assert scenario.walk(found).results[0] == pytest.approx(seen[-1].best, rel=1e-6)
     assert set(read_par(tmp_path / "out" / "best.par")) == set(found)
+    assert {name: best for name, (best, _, _) in read_par(tmp_path / "out" / "best.par").items()} == found
+    with pytest.raises(OsimliteError, match=r"best\.par' is there already: go on with it"):
+        search(Scenario(arm), tmp_path / "out", generations=1, population=8)
+    # The best so far is one of the candidates, and a mean beyond the bounds is none.
+    text = (tmp_path / "out" / "best.par").read_text().split("\n", 1)
+    name, best, _, std = text[0].split()
+    (tmp_path / "out" / "best.par").write_text(f"{name} {best} -5 {std}\n{text[1]}")
     again = search(Scenario(arm), tmp_path / "out", generations=1, population=8, resume=True)
-    assert set(again) == set(found)
+    assert scenario.walk(again).results[0] <= scenario.walk(found).results[0]
+
+
+def test_values_of_nothing_are_refused(arm) -> None:
+    scenario = Scenario(arm)
+    with pytest.raises(OsimliteError, match=r"no parameter 'flexor-elbow\.KQ'.*did you mean 'flexor-elbow\.KP'"):
+        scenario.walk({"flexor-elbow.KQ": 1.0}, duration=0.01)
+    with pytest.raises(OsimliteError, match=r"'flexor-elbow\.KP' has 3 values for 2 candidates"):
+        scenario.walk({"flexor-elbow.KP": np.ones(3)}, 2, duration=0.01)
 
 
 HOLDS = {
@@ -154,6 +169,14 @@ def test_yaml_and_data_of_python_say_the_same_as_a_scenario(arm, tmp_path) -> No
         ("max_duration = 1", "max_duration = long", "must be a number, not 'long'"),
         ("~2<0,20>", "~x", "must be a number or a parameter"),
         ("SimulationObjective", "lamda = 4 SimulationObjective", "'lamda' of a CmaOptimizer is not.*mean 'lambda'"),
+        ("P0 = 1.2", "P0 = 1.2 P0 = 2", "'P0' stands here again"),
+        ("dual_sided = 0", "dual_sided = perhaps", "'dual_sided' must be 0 or 1, not 'perhaps'"),
+        ("delay = 0.01", "delay = -0.01", "a delay of -0.01 s"),
+        ("min = 65 max = 72", "min = 72 max = 65", "from 72 to 65 there is no value"),
+        ("max_duration = 1", "max_duration = 0", "max_duration is to be positive"),
+        ("~2<0,20>", "~30<0,20>", "'flexor-elbow.KP' begins at 30, which is not from 0 to 20"),
+        ("~2<0,20>", "~2<20,0>", "begins at 2, which is not from 20 to 0"),
+        ("source = elbow P0 = 1.2 KP = ~2", "P0 = 1.2 KP = ~2", "'source', a coordinate, is missing"),
         ("dual_sided = 0", "dual_sided = 0 symetric = 1", "'symetric' of a ReflexController is not done here"),
     ],
 )

@@ -141,3 +141,12 @@ def test_times_and_files_that_mean_nothing(setup: Path) -> None:
         setup.write_text(SETUP.replace(old, new))
         with pytest.raises(OsimliteError, match=said):
             osimlite.run(setup, check=False)
+
+
+def test_a_study_with_a_property_that_nothing_knows_is_not_searched_for(repo, tmp_path):
+    for name in ("slide.osim", "slide_guess.sto", "slide_states.sto"):
+        (tmp_path / name).write_bytes((repo / "fixtures/setups" / name).read_bytes())
+    text = (repo / "fixtures/setups/slide.omoco").read_text().replace("<bounds>0 5</bounds>", "<bound>0 5</bound>")
+    (tmp_path / "slide.omoco").write_text(text)
+    with pytest.raises(FaultySetup, match=r"slide\.omoco:13:.*has no property <bound>"):
+        osimlite.run(tmp_path / "slide.omoco")
