@@ -126,7 +126,8 @@ def _filled(what: str, names: Sequence[str], default: Array, given: Any) -> Arra
     if isinstance(given, Mapping):
         for name, value in given.items():
             if name not in names:
-                raise SettingError(f"the model has no {what} '{name}'{did_you_mean(name, names)}")
+                near = next((f"; did you mean '{own}'?" for own in names if name in own.split("/")), "")
+                raise SettingError(f"the model has no {what} '{name}'{near or did_you_mean(name, names)}")
             result[names.index(name)] = value
     elif given is not None:
         if len(given) != len(names):
