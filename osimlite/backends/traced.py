@@ -17,7 +17,7 @@ from osimlite.simulation.engines.linking import PYTHON, Program
 from osimlite.simulation.kernels.constrained_dynamics import bind
 from osimlite.simulation.kernels.constraint_equations import add_wrench
 from osimlite.simulation.kernels.dynamics import evaluate, inverse
-from osimlite.simulation.kernels.layout import CONSTRAINED, ITEM, MODEL, STAGE, WORK
+from osimlite.simulation.kernels.layout import CONSTRAINED, ITEM, MODEL, RUN, STAGE, WORK
 from osimlite.simulation.kernels.pack import Packed
 from osimlite.simulation.kernels.pointers import address, call
 
@@ -109,6 +109,9 @@ class Traced:
             first, count = structure[MODEL.ITEM_AT], structure[MODEL.ITEMS]
             items = [item for item in structure[first : first + count] if self._path(item) in pushing]
             structure[MODEL.ITEMS], structure[first : first + len(items)] = len(items), items
+            run = structure[MODEL.RUN_AT]
+            structure[MODEL.RUNS], structure[run + RUN.LAW] = 1, 0
+            structure[run + RUN.FIRST], structure[run + RUN.END] = 0, len(items)
 
         def law(s: Vector, x: Vector, w: Vector, y: Vector, f: Vector) -> None:
             for k in range(size):

@@ -75,14 +75,10 @@ def test_moco_has_the_same_costs(build, repo):
     assert {*ours} == {"effort", "roughness"}
 
 
-def test_opensim_walks_as_we_do(build, tmp_path, repo):
-    """For a step; then the motion, which nothing holds, has made some thousands of what it was off."""
-    model = build(num_mesh_intervals=16, optim_convergence_tolerance=1e-2)
-    # CasADi and OpenSim cannot be loaded into one process.
-    command = [sys.executable, "-m", "osimlite", "run", str(model.with_suffix(".omoco")), "-o", str(tmp_path)]
-    subprocess.run(command, cwd=repo, check=True, capture_output=True)
-    stride = read_sto(tmp_path / "human-walks_stride.sto")
-    step = float(stride.times[len(stride.times) // 2])
+def test_opensim_walks_as_we_do(build):
+    """By the excitations of the guess, which are the same on all processors; until it has fallen a little."""
+    model = build(num_mesh_intervals=16)
+    stride, step = read_sto(model.with_name("human-walks_guess.sto")), 0.25
     opensim.Logger.setLevelString("Error")
     times, theirs = forward(opensim, model, stride, step)
     controls = {name: stride[name] for name in stride.columns if name.count("/") == 2}
@@ -99,9 +95,8 @@ def test_opensim_walks_as_we_do(build, tmp_path, repo):
     for k, info in enumerate(ours.mechanism.coordinates):
         name = f"{info.path}/value"
         off = np.abs(np.interp(times, ours.times, ours.values[:, k]) - theirs[name])
-        assert off.max() < 1e-5, name
+        assert off.max() < 1e-6, name
         # What the coarse mesh was off has not grown much after half a step.
-        assert np.abs(theirs[name] - stride[name][: len(times)])[: len(times) // 2].max() < 0.1, name
     half = len(times) // 2
     assert np.min(theirs["/jointset/ground_pelvis/pelvis_ty/value"][:half]) > 0.85
     way = theirs["/jointset/ground_pelvis/pelvis_tx/value"][half]
