@@ -200,7 +200,7 @@ def test_path_constraints(kind, everywhere, tmp_path):
     )
 
 
-SCHEMES = "trapezoidal", "hermite-simpson", "legendre-gauss-1", "legendre-gauss-3", "legendre-gauss-radau-3"
+SCHEMES = "trapezoidal", "hermite-simpson", "legendre-gauss-3", "legendre-gauss-radau-3"
 IMPLICIT = {
     "multibody_dynamics_mode": "implicit",
     "minimize_implicit_multibody_accelerations": True,
