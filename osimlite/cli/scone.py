@@ -64,7 +64,7 @@ def scone(
     from osimlite.reflexes.search import BEST, search
     from osimlite.simulation.files.storage import write_sto
 
-    if not optimize and (resume or not generations is population is seed is None):
+    if not optimize and (resume or any(given is not None for given in (generations, population, seed))):
         raise SettingError("--generations, --population, --seed and --resume say how to search; add --optimize")
     if str(scenario) == SCENARIO:
         scenario = write_scenario(output)

@@ -22,8 +22,9 @@ from osimlite.forces.muscles import (
 )
 
 VELOCITY_ROUNDS, LENGTH_ROUNDS = 20, 200
-VELOCITY_TOLERANCE = 1e-10  # of the strength
 """Newton's steps in the search for a velocity, and for an equilibrium."""
+VELOCITY_TOLERANCE = 1e-10
+"""What a velocity may leave of a force that is to be zero, as part of the strength."""
 SMALLEST = 2.0**-26
 """Least part of a step, and the step (m) in the other direction where there is none."""
 

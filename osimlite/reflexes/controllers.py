@@ -19,8 +19,9 @@ from osimlite.text import or_known
 
 STATES = "EarlyStance", "LateStance", "Liftoff", "Swing", "Landing"
 CONTROLLERS = "GaitStateController", "ReflexController"
-KINDS = "MuscleReflex", "ConditionalMuscleReflex", "DofReflex"
 """What is done here."""
+KINDS = "MuscleReflex", "ConditionalMuscleReflex", "DofReflex"
+"""Of reflexes."""
 NEVER = -1.0
 """A threshold that has no effect."""
 

@@ -227,6 +227,9 @@ class EffortMeasure(Measure):
 class Penalty(Measure):
     """How far numbers are beyond ranges, over time."""
 
+    _asked: tuple[tuple[str, int], ...] = ()
+    """Of each number the mode, and where it is noted."""
+
     def penalize(self, node: Node, kind: int, place: int = 0, factor: float = 1.0) -> None:
         """Ask for a number; `node` says how it is punished."""
         numbers = [factor, node.number("min", -inf), node.number("max", inf)]
@@ -237,12 +240,12 @@ class Penalty(Measure):
         mode = node.text("mode", "average")
         if mode not in ("average", "highest", "lowest", "sum"):
             raise node.error(f"penalties have no mode '{mode}'")
-        self._asked = [*getattr(self, "_asked", ()), (mode, self.criteria.add(kind, place, self, *numbers))]
+        self._asked = *self._asked, (mode, self.criteria.add(kind, place, self, *numbers))
 
     def result(self, times: Array, duration: float) -> Array:
         """As `Measure` says."""
         places, total = {"sum": NOTED.TOTAL, "highest": NOTED.HIGHEST, "lowest": NOTED.LOWEST}, np.zeros(self.count)
-        for mode, first in getattr(self, "_asked", ()):
+        for mode, first in self._asked:
             total += self.noted(first, places[mode]) if mode in places else self.average(first)
         return total
 

@@ -49,7 +49,7 @@ class Leg(NamedTuple):
 
 
 LAGGING = "euler2", "merson"
-"""Integrators whose control steps begin with the derivative that the one before has ended with."""
+"""Integrators of SCONE, whose control steps begin with the derivative that the one before has ended with."""
 
 
 class Walkers:
@@ -92,8 +92,6 @@ class Walkers:
         longest: float = inf,
     ) -> None:
         self.count, self.step = count, step
-        # As SCONE does it, with the integrators that it has.
-        self._lags = integrator in LAGGING
         self.copies = Copies(model, count, step, accuracy, integrator, longest)
         self.engine: Any = self.copies.engine
         self.mechanism = self.copies.simulation.mechanism
@@ -119,12 +117,12 @@ class Walkers:
         }
         self.activations = np.array([self.places[f"{path}/activation"] for path in self.copies.controls])
         self.legs = self._legs(upper, lower, contact)
-        self.senses, self.known = self._sensing()
+        self.senses, self.known = self._sensing(lags=integrator in LAGGING)
         self.rows, self.excitations = np.zeros((count, self.senses[SENSES.SIZE])), np.zeros((count, len(self.muscles)))
         self.progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
         self._driven: Ints = np.array([self.copies.places, self.activations])
 
-    def _sensing(self) -> tuple[Ints, Array]:
+    def _sensing(self, *, lags: bool) -> tuple[Ints, Array]:
         """Plan of what is felt, and its numbers; see :mod:`osimlite.simulation.kernels.senses`."""
         engine, bodies, names = self.engine, self.mechanism.bodies, self.copies.controls
         limits: list[int] = []
@@ -144,7 +142,7 @@ class Walkers:
             centres.append(frame[:3, :3] @ body.mass_properties.center + frame[:3, 3])
         masses = np.array([body.mass_properties.mass for body in bodies])
         own = (
-            [self.weight, masses.sum(), self.step, float(self._lags)],
+            [self.weight, masses.sum(), self.step, float(lags)],
             self.optimal,
             self.strengths,
             self.least,
