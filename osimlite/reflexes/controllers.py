@@ -80,15 +80,8 @@ class Reflexes:
                 ("stance_load_threshold", 0.1), ("landing_threshold", 0.0), ("late_stance_threshold", 0.0),
                 ("liftoff_threshold", NEVER),
             )}  # fmt: skip
-            swing = node.get("swing_load_threshold")
-            loads = (
-                of["stance_load_threshold"],
-                (
-                    of["stance_load_threshold"]
-                    if swing is None
-                    else parameters.read(swing, prefix + "swing_load_threshold")
-                ),
-            )
+            stance, swing = of["stance_load_threshold"], node.get("swing_load_threshold")
+            loads = stance, stance if swing is None else parameters.read(swing, prefix + "swing_load_threshold")
             ahead = (length * of[f"{name}_threshold"] for name in ("late_stance", "liftoff", "landing"))
             first = 1 + LIMITS.OF_LEG * leg
             self._limits[:, first : first + LIMITS.OF_LEG] = np.column_stack([*loads, *ahead])
