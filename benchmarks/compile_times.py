@@ -36,7 +36,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements.kind import kinds
 from osimlite.simulation.engines import machine_code, sources
-from osimlite.simulation.kernels.table import LAW_MODULES
+from osimlite.kernels.table import LAW_MODULES
 
 def block():
     from motions import block

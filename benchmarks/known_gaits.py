@@ -16,6 +16,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from osimlite.kernels.record import STOPPED
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import HuntCrossleyForce
@@ -23,7 +24,6 @@ from osimlite.schema.frames import Body
 from osimlite.schema.joints import PinJoint, PlanarJoint
 from osimlite.schema.model import Model
 from osimlite.simulation import Simulation
-from osimlite.simulation.kernels.record import STOPPED
 from osimlite.simulation.many import Watch, run_many
 
 GRAVITY = 9.81

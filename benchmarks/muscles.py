@@ -30,8 +30,8 @@ from rich.table import Table
 import osimlite
 from _corpus import CORPUS
 from _pair import Pair, pair, report
+from osimlite.kernels.layout import STAGE
 from osimlite.simulation import Simulation
-from osimlite.simulation.kernels.layout import STAGE
 from osimlite.simulation.system import System
 from osimlite.sweep.plan import plan
 from osimlite.sweep.runner import Runner

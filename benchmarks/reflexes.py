@@ -16,9 +16,9 @@ import tempfile
 import time
 from pathlib import Path
 
+from osimlite.kernels.walks import FORCES
 from osimlite.models.walking import write_scenario
 from osimlite.reflexes.scenario import Scenario
-from osimlite.simulation.kernels.walks import FORCES
 
 CANDIDATES, TIMES = 16, 3
 OPENSIM = """

@@ -21,6 +21,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from osimlite._require import require
+from osimlite.kernels.layout import ITEM, MODEL
 from osimlite.multibody.functions import Constant, Function, Polynomial
 from osimlite.multibody.mechanism import Values
 from osimlite.multibody.spatial import Array
@@ -28,7 +29,6 @@ from osimlite.robot.drivers import coordinate_drivers
 from osimlite.robot.principal_axes import principal_axes
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.kernels.layout import ITEM, MODEL
 from osimlite.simulation.system import System
 from osimlite.translate.mjcf.draft import Version
 from osimlite.translate.mjcf.driven import STATES

@@ -8,16 +8,16 @@ import numpy as np
 
 from osimlite.backends.symbolic import on_symbols
 from osimlite.backends.symbols import Vector, casadi
-from osimlite.multibody.linear import REDUNDANT
+from osimlite.kernels.constrained_dynamics import away_from_ground, bind, toward_ground
+from osimlite.kernels.dynamics import evaluate, solve
+from osimlite.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, MODEL, OUTCOME, STAGE
+from osimlite.kernels.least_squares import REDUNDANT
+from osimlite.kernels.pointers import Law
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.constrained import kept_state
 from osimlite.simulation.engines.linking import PYTHON, Program
-from osimlite.simulation.kernels.constrained_dynamics import away_from_ground, bind, toward_ground
-from osimlite.simulation.kernels.dynamics import evaluate, solve
-from osimlite.simulation.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, MODEL, OUTCOME, STAGE
-from osimlite.simulation.kernels.pack import Packed
-from osimlite.simulation.kernels.pointers import Law
+from osimlite.simulation.pack import Packed
 from osimlite.simulation.states import StateLayout
 
 POSES = 3

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from osimlite.errors import SettingError, UnsupportedError
+from osimlite.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.spatial import Array
@@ -19,8 +20,7 @@ from osimlite.schema.model import Model, expect_model
 from osimlite.simulation.constrained import kept_state
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.probe import DeclaredProbe
-from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, STAGE
-from osimlite.simulation.kernels.pack import Packed, pack
+from osimlite.simulation.pack import Packed, pack
 from osimlite.simulation.states import StateLayout, in_model_order
 from osimlite.text import did_you_mean
 

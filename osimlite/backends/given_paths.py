@@ -16,6 +16,9 @@ import numpy as np
 
 from osimlite.backends.symbolic import taken
 from osimlite.backends.symbols import casadi
+from osimlite.kernels.function_paths import ARMS, DERIVATIVES
+from osimlite.kernels.layout import ITEM, MODEL, OUTCOME
+from osimlite.kernels.paths import LENGTH, SPEED
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.records import replace
@@ -23,9 +26,6 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.elements.kind import DeclaredForce
-from osimlite.simulation.kernels.function_paths import ARMS, DERIVATIVES
-from osimlite.simulation.kernels.layout import ITEM, MODEL, OUTCOME
-from osimlite.simulation.kernels.paths import LENGTH, SPEED
 from osimlite.simulation.path_system import MeasuredPath, PathSystem
 
 STEP = 1e-4
@@ -58,7 +58,7 @@ class GivenPath:
         return 1 + 2 * len(self.coordinates)
 
     def items(self, places: Places) -> list[Item]:
-        """As of a path that is a function of coordinates; see :mod:`osimlite.simulation.kernels.function_paths`."""
+        """As of a path that is a function of coordinates; see :mod:`osimlite.kernels.function_paths`."""
         freedoms = [places.freedom(coordinate) for coordinate in self.coordinates]
         count = len(freedoms)
 

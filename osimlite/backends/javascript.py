@@ -15,8 +15,8 @@ from types import FunctionType
 from typing import Any
 
 from osimlite.backends.reader import Function, Kernel, name_of
+from osimlite.kernels import pointers
 from osimlite.simulation.engines.sources import functions_within
-from osimlite.simulation.kernels import pointers
 
 BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**", ast.BitAnd: "&"}
 COMPARED = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "===", ast.NotEq: "!=="}

@@ -8,6 +8,10 @@ from typing import Any
 from osimlite.backends.symbolic import on_symbols
 from osimlite.backends.symbols import casadi
 from osimlite.backends.traced import Evaluated
+from osimlite.kernels.layout import INERTIA_AT, LINK, LINK_WORK, MODEL
+from osimlite.kernels.parts import link_ints
+from osimlite.kernels.paths import LENGTH, SPEED
+from osimlite.kernels.points import angular_velocity, direction, station, velocity
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
@@ -16,11 +20,7 @@ from osimlite.simulation.elements.geometries.sphere_on_plane import SPHERE_ON_PL
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.elements.probe import DeclaredProbe
-from osimlite.simulation.kernels.layout import INERTIA_AT, LINK, LINK_WORK, MODEL
-from osimlite.simulation.kernels.pack import Packed
-from osimlite.simulation.kernels.parts import link_ints
-from osimlite.simulation.kernels.paths import LENGTH, SPEED
-from osimlite.simulation.kernels.points import angular_velocity, direction, station, velocity
+from osimlite.simulation.pack import Packed
 
 AXES = "xyz"
 

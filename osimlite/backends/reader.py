@@ -14,7 +14,7 @@ from functools import cached_property
 from textwrap import dedent
 from typing import Any
 
-from osimlite.simulation.kernels.layout import Record
+from osimlite.kernels.layout import Record
 
 Function = Callable[..., Any]
 

@@ -16,8 +16,8 @@ from osimlite.backends.reader import Function, Kernel, name_of, stored
 from osimlite.backends.symbols import COUNTERPARTS, UNSET, NoFormula, Vector
 from osimlite.forces.bezier import curve_value
 from osimlite.forces.millard2012_equilibrium import damped_velocity
-from osimlite.simulation.kernels import pointers
-from osimlite.simulation.kernels.trigonometry import sine_cosine
+from osimlite.kernels import pointers
+from osimlite.kernels.trigonometry import sine_cosine
 
 HELP = {
     "divide_": symbols.divide,

@@ -11,15 +11,15 @@ from osimlite.backends.constraints import dynamics_with
 from osimlite.backends.symbolic import on_symbols, standing_in, taken
 from osimlite.backends.symbols import Vector, casadi
 from osimlite.errors import UnsupportedError
+from osimlite.kernels.constrained_dynamics import bind
+from osimlite.kernels.constraint_equations import add_wrench
+from osimlite.kernels.dynamics import evaluate, inverse
+from osimlite.kernels.layout import CONSTRAINED, ITEM, MODEL, RUN, STAGE, WORK
+from osimlite.kernels.pointers import address, call
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.engines.linking import PYTHON, Program
-from osimlite.simulation.kernels.constrained_dynamics import bind
-from osimlite.simulation.kernels.constraint_equations import add_wrench
-from osimlite.simulation.kernels.dynamics import evaluate, inverse
-from osimlite.simulation.kernels.layout import CONSTRAINED, ITEM, MODEL, RUN, STAGE, WORK
-from osimlite.simulation.kernels.pack import Packed
-from osimlite.simulation.kernels.pointers import address, call
+from osimlite.simulation.pack import Packed
 
 WRAPS = "its path bends around surfaces; put a FunctionBasedPath that is fitted to it in its place"
 MESH = "a mesh is in contact; take spheres and half spaces"

@@ -9,6 +9,9 @@ import numpy as np
 
 from osimlite.errors import SimulationError
 from osimlite.fitting.pose_layout import FitLayout, Goal, Marker, Sensor, substituted
+from osimlite.kernels import pose_record as fit
+from osimlite.kernels.pointers import Floats, Ints
+from osimlite.kernels.pose_fit import APART, STUCK, UNSEEN
 from osimlite.multibody.constraints import Lock, Prescribed
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import Mechanism
@@ -18,9 +21,6 @@ from osimlite.simulation.constrained import free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.items import Places
 from osimlite.simulation.engines.linking import Code
-from osimlite.simulation.kernels import pose_record as fit
-from osimlite.simulation.kernels.pointers import Floats, Ints
-from osimlite.simulation.kernels.pose_fit import APART, STUCK, UNSEEN
 from osimlite.simulation.system import System
 
 

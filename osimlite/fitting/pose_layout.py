@@ -6,16 +6,16 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from osimlite.kernels import pose_record as fit
+from osimlite.kernels.layout import CONSTRAINED, LINK, MODEL, MOTION, OPERATION
+from osimlite.kernels.least_squares import factor_room
+from osimlite.kernels.pointers import Floats, Ints
+from osimlite.kernels.pose_fit import POSES
 from osimlite.multibody.constraints import Constraint, Coupler
+from osimlite.multibody.function_tables import function_table
 from osimlite.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
 from osimlite.records import dataclass
 from osimlite.simulation.elements.items import Places
-from osimlite.simulation.kernels import pose_record as fit
-from osimlite.simulation.kernels.functions import function_table
-from osimlite.simulation.kernels.layout import CONSTRAINED, LINK, MODEL, MOTION, OPERATION
-from osimlite.simulation.kernels.least_squares import factor_room
-from osimlite.simulation.kernels.pointers import Floats, Ints
-from osimlite.simulation.kernels.pose_fit import POSES
 from osimlite.simulation.system import System
 
 SCAN = 2001

@@ -9,6 +9,37 @@ from __future__ import annotations
 
 from math import acos, asin, atan, copysign, cos, cosh, erf, erfc, exp, floor, inf, log, nan, sin, sinh, sqrt, tan, tanh
 
+FUNCTIONS = {
+    "sqrt": "square_root",
+    "exp": "exponential",
+    "log": "logarithm",
+    "sin": "sine",
+    "cos": "cosine",
+    "sec": "secant",
+    "csc": "cosecant",
+    "tan": "tangent",
+    "cot": "cotangent",
+    "asin": "arcsine",
+    "acos": "arccosine",
+    "atan": "arctangent",
+    "sinh": "hyperbolic_sine",
+    "cosh": "hyperbolic_cosine",
+    "tanh": "hyperbolic_tangent",
+    "erf": "error_function",
+    "erfc": "complementary_error_function",
+    "step": "unit_step",
+    "delta": "is_zero",
+    "square": "square",
+    "cube": "cube",
+    "recip": "reciprocal",
+    "min": "smaller",
+    "max": "larger",
+    "abs": "magnitude",
+}
+"""The law for each of Lepton's functions."""
+
+OF_TWO = ("min", "max")
+
 
 def divide(a: float, b: float) -> float:
     """a / b, infinite for b = 0."""

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.kernels.paths import CONDITIONAL
 from osimlite.lint.measures import Jump
 from osimlite.measuring.sweeps import Sweep
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
-from osimlite.simulation.kernels.paths import CONDITIONAL
 from osimlite.simulation.paths import Paths
 
 LEAST = 1e-3

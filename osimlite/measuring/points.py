@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.kernels.paths import MOVING
 from osimlite.lint.measures import MovingPoint, Value
 from osimlite.multibody.functions import Scaled
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.elements.geometries.paths.geometry_path import Node, ThroughPoints
-from osimlite.simulation.kernels.paths import MOVING
 from osimlite.simulation.paths import Paths
 
 

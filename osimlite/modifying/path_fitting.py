@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.kernels.paths import LENGTH
 from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.schema.functions import MultivariatePolynomialFunction
 from osimlite.schema.model import Model
 from osimlite.schema.paths import FunctionBasedPath
-from osimlite.simulation.kernels.paths import LENGTH
 from osimlite.simulation.paths import Paths, paths
 
 TOLERANCE = 1e-4

@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from osimlite.errors import SimulationError
+from osimlite.kernels.constrained_dynamics import SAFE_MASS, SLIGHT
+from osimlite.kernels.least_squares import ROUNDING
 from osimlite.multibody.kinematics import Kinematics
-from osimlite.multibody.linear import ROUNDING, shortest, solutions, stacked
+from osimlite.multibody.linear import shortest, solutions, stacked
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 
@@ -27,11 +29,6 @@ if TYPE_CHECKING:
 
 LARGEST = 1e100
 """Numbers beyond this, in SI units, are not computed with, nor inertias below its inverse: their squares overflow."""
-SAFE_MASS = 1e-10
-"""What each speed must move, as part of its inertia, for the mass matrix to be divided by."""
-SLIGHT = 2.0**-19.5
-"""Times the root of their number: equations whose forces move this part of what the strongest one's do are left out, as
-in Simbody: its complete orthogonal factorization of G M⁻¹ Gᵀ has the square of it as tolerance."""
 
 
 class Wrench(NamedTuple):

@@ -6,12 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from osimlite.kernels.least_squares import REDUNDANT, ROUNDING
 from osimlite.multibody.spatial import Array
-
-REDUNDANT = 1e-9
-"""An equation that differs from what others say by less than this part of itself says nothing new."""
-ROUNDING = 1e-13
-"""What is shorter than this part of the longest equation, or than this at all, is rounding error: in m and rad."""
 
 
 def stacked(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.kernels.pointers import Ints
+from osimlite.kernels.reflexes import FREE, LIMITS, OF_RESULT, OF_SENSOR, TERM
 from osimlite.multibody.spatial import Array
 from osimlite.reflexes.parameters import Parameters
 from osimlite.reflexes.settings import Node
 from osimlite.reflexes.walkers import SIDES, Walkers
-from osimlite.simulation.kernels.pointers import Ints
-from osimlite.simulation.kernels.reflexes import FREE, LIMITS, OF_RESULT, OF_SENSOR, TERM
 from osimlite.text import or_known
 
 STATES = "EarlyStance", "LateStance", "Liftoff", "Swing", "Landing"
@@ -218,7 +218,7 @@ class Reflexes:
             self._terms.append(Part((target, -1, FREE, leg, states, -1), zero, constant, zero))
 
     def compiled(self) -> tuple[Ints, Array]:
-        """What the kernels go by (see :mod:`osimlite.simulation.kernels.reflexes`): integers, and of each candidate the
+        """What the kernels go by (see :mod:`osimlite.kernels.reflexes`): integers, and of each candidate the
         numbers (w, r)."""
         # What goes by sensors is added first.
         parts = [*sorted(self._terms, key=lambda term: term.ints[TERM.SENSOR] < 0), *self._gates]

@@ -1,7 +1,7 @@
 """What a walk is judged by: SCONE's measures, of all candidates at once.
 
 Each class of measures is one class here, found by its name. While candidates walk, the kernels note what measures ask
-for (:mod:`osimlite.simulation.kernels.criteria`); the results are made of that.
+for (:mod:`osimlite.kernels.criteria`); the results are made of that.
 """
 
 from __future__ import annotations
@@ -12,10 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array
-from osimlite.reflexes.settings import Node
-from osimlite.reflexes.walkers import SIDES, Walkers
-from osimlite.simulation.kernels.criteria import (
+from osimlite.kernels.criteria import (
     CRITERION,
     GAIT,
     GAIT_NOTED,
@@ -27,8 +24,11 @@ from osimlite.simulation.kernels.criteria import (
     WANG,
     WHOLE_LOAD,
 )
-from osimlite.simulation.kernels.pointers import Ints
-from osimlite.simulation.kernels.senses import SENSES
+from osimlite.kernels.pointers import Ints
+from osimlite.kernels.senses import SENSES
+from osimlite.multibody.spatial import Array
+from osimlite.reflexes.settings import Node
+from osimlite.reflexes.walkers import SIDES, Walkers
 from osimlite.text import or_known
 
 LIGHT = 299792458.0

@@ -11,6 +11,7 @@ import numpy as np
 
 from osimlite.document.reader import read
 from osimlite.errors import SettingError, SimulationError
+from osimlite.kernels.walks import BEGIN, FEEL, GOING, START, STEPS
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.reflexes.controllers import CONTROLLERS, Reflexes
@@ -20,7 +21,6 @@ from osimlite.reflexes.settings import Node, found_file, read_settings, settings
 from osimlite.reflexes.walkers import Walkers
 from osimlite.schema.model import Model
 from osimlite.simulation.files.storage import StoTable, read_sto
-from osimlite.simulation.kernels.walks import BEGIN, FEEL, GOING, START, STEPS
 from osimlite.text import listed, or_known
 
 OPTIMIZERS = "CmaOptimizer", "CmaPoolOptimizer"

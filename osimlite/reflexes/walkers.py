@@ -9,6 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite.errors import ModelError
+from osimlite.kernels.layout import OUTCOME
+from osimlite.kernels.pointers import Ints
+from osimlite.kernels.reflexes import REFLEXES
+from osimlite.kernels.senses import OF_MUSCLES, SENSES
+from osimlite.kernels.walks import COUNTS, LEGS, STEPS
 from osimlite.multibody.mechanism import GROUND
 from osimlite.multibody.spatial import Array
 from osimlite.schema.forces import CoordinateLimitForce
@@ -16,11 +21,6 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.copies import Copies
 from osimlite.simulation.elements.contact import PairContact
-from osimlite.simulation.kernels.layout import OUTCOME
-from osimlite.simulation.kernels.pointers import Ints
-from osimlite.simulation.kernels.reflexes import REFLEXES
-from osimlite.simulation.kernels.senses import OF_MUSCLES, SENSES
-from osimlite.simulation.kernels.walks import COUNTS, LEGS, STEPS
 from osimlite.text import did_you_mean, listed
 
 SIDES = "_l", "_r"
@@ -70,7 +70,7 @@ class Walkers:
         senses, known: plan of the rows, and its numbers.
         rows: what is felt of each (w, r).
         excitations: that are held (w, m).
-        progress: what is counted of each walk (w, c), see :mod:`osimlite.simulation.kernels.walks`.
+        progress: what is counted of each walk (w, c), see :mod:`osimlite.kernels.walks`.
         noted: by the criteria (w, k).
 
     Raises:
@@ -123,7 +123,7 @@ class Walkers:
         self._driven: Ints = np.array([self.copies.places, self.activations])
 
     def _sensing(self, *, lags: bool) -> tuple[Ints, Array]:
-        """Plan of what is felt, and its numbers; see :mod:`osimlite.simulation.kernels.senses`."""
+        """Plan of what is felt, and its numbers; see :mod:`osimlite.kernels.senses`."""
         engine, bodies, names = self.engine, self.mechanism.bodies, self.copies.controls
         limits: list[int] = []
         for item in self.copies.simulation.model.components(CoordinateLimitForce):
@@ -199,12 +199,12 @@ class Walkers:
         return int(self.senses[SENSORS[kind]]) + number
 
     def go_by(self, plan: Ints, numbers: Array, criteria: Ints, bounds: Array, room: int) -> None:
-        """Have walks go by reflexes (see :mod:`osimlite.simulation.kernels.reflexes`), and criteria judge them.
+        """Have walks go by reflexes (see :mod:`osimlite.kernels.reflexes`), and criteria judge them.
 
         Args:
             plan: of the reflexes, whose `NUMBERS` and `ROOM` are left to this.
             numbers: of each candidate (w, r).
-            criteria: see :mod:`osimlite.simulation.kernels.criteria`.
+            criteria: see :mod:`osimlite.kernels.criteria`.
             bounds: their numbers.
             room: that they need.
         """
@@ -217,7 +217,7 @@ class Walkers:
         self._asked = self.senses, self.known, self._driven, plan, numbers, criteria, bounds, whole
 
     def go(self, order: int, which: Sequence[int] | None = None) -> Array:
-        """Have walkers (all by default) go on by an order of :mod:`osimlite.simulation.kernels.walks`.
+        """Have walkers (all by default) go on by an order of :mod:`osimlite.kernels.walks`.
 
         Returns:
             Of each control step of the first walker the state at its start, excitations, loads.

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from osimlite.kernels.layout import LINK_WORK
 from osimlite.multibody.parts import GROUND
 from osimlite.records import dataclass
-from osimlite.simulation.kernels.layout import LINK_WORK
 
 if TYPE_CHECKING:
     from osimlite.simulation.system import System

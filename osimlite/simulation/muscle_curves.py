@@ -12,6 +12,7 @@ import numpy as np
 from osimlite._lazy import shown_in_notebooks
 from osimlite._require import require
 from osimlite.errors import SettingError, SimulationError
+from osimlite.kernels.layout import OUTCOME, STAGE
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.extremes import any_numbers
 from osimlite.multibody.functions import Constant
@@ -23,7 +24,6 @@ from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.elements.kind import DeclaredForce
-from osimlite.simulation.kernels.layout import OUTCOME, STAGE
 from osimlite.simulation.paths import Paths
 from osimlite.simulation.system import System
 from osimlite.simulation.tabular import Tabular

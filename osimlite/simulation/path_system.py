@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.errors import SimulationError
+from osimlite.kernels.layout import OUTCOME, STAGE
+from osimlite.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SURFACE
+from osimlite.kernels.wrapping import SURFACE_LENGTH
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass, replace
 from osimlite.simulation.elements.geometries.path import Path as Along
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.elements.items import Item, Places, Silent
-from osimlite.simulation.kernels.layout import OUTCOME, STAGE
-from osimlite.simulation.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SURFACE
-from osimlite.simulation.kernels.wrapping import SURFACE_LENGTH
 from osimlite.simulation.states import StateVariable
 from osimlite.simulation.system import System
 

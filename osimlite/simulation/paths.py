@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from osimlite._lazy import shown_in_notebooks
+from osimlite.kernels.paths import LENGTH, SPEED
+from osimlite.kernels.projection import REDUNDANT
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Constraint, Lock
 from osimlite.multibody.extremes import any_numbers, methods_of_any_numbers
@@ -24,8 +26,6 @@ from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.engines.linking import Code
-from osimlite.simulation.kernels.paths import LENGTH, SPEED
-from osimlite.simulation.kernels.projection import REDUNDANT
 from osimlite.simulation.path_system import MeasuredPath, PathSystem
 from osimlite.simulation.polylines import Course, Polylines
 

@@ -8,12 +8,12 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from osimlite.kernels.layout import ITEM, LINK_WORK, MODEL
+from osimlite.kernels.pointers import Ints
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.elements.items import Item, Placement, Places
 from osimlite.simulation.engines.linking import Code, best
-from osimlite.simulation.kernels.layout import ITEM, LINK_WORK, MODEL
-from osimlite.simulation.kernels.pointers import Ints
 
 
 @runtime_checkable

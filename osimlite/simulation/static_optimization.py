@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.errors import ModelError, SettingError, UnsupportedError
+from osimlite.kernels.effort import effort_room
+from osimlite.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
@@ -36,8 +38,6 @@ from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.engines.linking import best
 from osimlite.simulation.files.storage import StoTable
-from osimlite.simulation.kernels.effort import effort_room
-from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.simulation.system import System
 from osimlite.text import counted, listed, or_known
 

@@ -15,6 +15,9 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from osimlite.errors import SimulationError
+from osimlite.kernels import layout
+from osimlite.kernels.layout import CONTACT_WORK, ITEM, LINK_WORK, MODEL, OUTCOME, STAGE, WORK
+from osimlite.kernels.pointers import Floats
 from osimlite.multibody.dynamics import massless
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
@@ -24,16 +27,13 @@ from osimlite.simulation.elements.items import CONTROLS, ForceElement
 from osimlite.simulation.elements.muscle import STRENGTH
 from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.engines.linking import Code, Program, best
-from osimlite.simulation.kernels import layout
-from osimlite.simulation.kernels.layout import CONTACT_WORK, ITEM, LINK_WORK, MODEL, OUTCOME, STAGE, WORK
-from osimlite.simulation.kernels.pack import pack
-from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.link_motion import Moments, moving
+from osimlite.simulation.pack import pack
 from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import NoSolution
 
 if TYPE_CHECKING:
-    from osimlite.simulation.kernels.pack_chain import Chain
+    from osimlite.simulation.pack_chain import Chain
 
 
 class System:
@@ -230,9 +230,9 @@ class System:
 
     def _told(self, item: int) -> str:
         """What an item is that has no solution."""
+        from osimlite.kernels.paths import LENGTH
         from osimlite.simulation.elements.geometries.path import PATH
         from osimlite.simulation.elements.kind import DeclaredForce
-        from osimlite.simulation.kernels.paths import LENGTH
 
         owner = self._owners[item]
         element: Any = self.forces.elements[owner]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import SimulationError
+from osimlite.kernels.layout import STAGE
 from osimlite.multibody.functions import Function, PiecewiseConstant
 from osimlite.multibody.smoothing_spline import PiecewisePolynomial
 from osimlite.multibody.spatial import Array
@@ -22,7 +23,6 @@ from osimlite.schema.control_sets import ControlLinear, ControlLinearNode, Contr
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements.control_sets import EXCITATION, node_curve
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.kernels.layout import STAGE
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
 from osimlite.tools.job import Job

@@ -7,9 +7,10 @@ from contextlib import suppress
 
 import numpy as np
 
+from osimlite.kernels.constrained_dynamics import SLIGHT
 from osimlite.multibody.body_constraints import carrier
 from osimlite.multibody.constraints import Constraint, Coupler
-from osimlite.multibody.dynamics import SLIGHT, MassCentres
+from osimlite.multibody.dynamics import MassCentres
 from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.linear import shortest
 from osimlite.multibody.mechanism import Mechanism

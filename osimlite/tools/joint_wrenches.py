@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from osimlite.kernels.layout import LINK_WORK
 from osimlite.multibody.parts import GROUND
 from osimlite.multibody.spatial import Array
 from osimlite.schema.joints import Joint
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.kernels.layout import LINK_WORK
 from osimlite.simulation.link_motion import LinkMotion
 from osimlite.simulation.system import System
 from osimlite.tools.constraint_forces import ConstraintForces

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import SettingError
+from osimlite.kernels.layout import STAGE
 from osimlite.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.files.storage import StoTable
-from osimlite.simulation.kernels.layout import STAGE
 from osimlite.simulation.link_motion import LinkMotion
 from osimlite.simulation.probed import Moment
 from osimlite.simulation.run import Simulation

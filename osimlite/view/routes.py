@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from osimlite.backends.javascript import as_javascript
-from osimlite.simulation.kernels.layout import ITEM, LINK_WORK
-from osimlite.simulation.kernels.paths import pull_path
-from osimlite.simulation.kernels.table import law_function
+from osimlite.kernels.layout import ITEM, LINK_WORK
+from osimlite.kernels.paths import pull_path
+from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.polylines import Polylines
 
 

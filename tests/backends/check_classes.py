@@ -14,6 +14,8 @@ from osimlite.backends.symbolic import on_symbols
 from osimlite.backends.traced import Traced
 from osimlite.errors import SimulationError, UnsupportedError
 from osimlite.forces import millard2012_equilibrium
+from osimlite.kernels.layout import CONSTRAINED, MODEL, STAGE
+from osimlite.kernels.table import LAW_MODULES
 from osimlite.multibody import Mechanism
 from osimlite.schema.actuators import ActivationCoordinateActuator, CoordinateActuator
 from osimlite.schema.coordinate_stops import CoordinateLinearStopForce, ExponentialCoordinateLimitForce
@@ -27,10 +29,9 @@ from osimlite.schema.path_actuators import ClutchedPathSpring
 from osimlite.schema.probe_types import ActuatorForceProbe, ActuatorPowerProbe, SystemEnergyProbe
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.kind import Kind, kinds
+from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.engines.sources import functions_within
-from osimlite.simulation.kernels.layout import CONSTRAINED, MODEL, STAGE
-from osimlite.simulation.kernels.pack import pack
-from osimlite.simulation.kernels.table import LAW_MODULES, law_function
+from osimlite.simulation.pack import pack
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
 from tests.backends.jets import carried

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.kernels.dynamics import evaluate
+from osimlite.kernels.layout import MODEL, STAGE, WORK
+from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.engines.linking import PYTHON, Program
-from osimlite.simulation.kernels.dynamics import evaluate
-from osimlite.simulation.kernels.layout import MODEL, STAGE, WORK
-from osimlite.simulation.kernels.table import law_function
 
 
 class Jet:
@@ -161,7 +161,7 @@ MATHEMATICS: dict[str, Callable[..., Any]] = {name: _of_one(name) for name in SL
 }
 
 
-OURS = "osimlite.forces", "osimlite.simulation.kernels", "osimlite.simulation.elements"
+OURS = "osimlite.forces", "osimlite.kernels", "osimlite.simulation.elements"
 """Where kernels and laws are."""
 
 

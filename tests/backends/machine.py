@@ -11,7 +11,7 @@ import numpy as np
 
 import osimlite
 from osimlite.simulation.constrained import kept_state
-from osimlite.simulation.kernels.pack import pack
+from osimlite.simulation.pack import pack
 from osimlite.simulation.run import Simulation
 from tests.backends.jets import carried
 

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from osimlite.backends.javascript import as_javascript
+from osimlite.kernels.paths import pull_path
+from osimlite.kernels.pointers import at
+from osimlite.kernels.table import LAW_MODULES
 from osimlite.simulation.elements.kind import Kind, kinds
-from osimlite.simulation.kernels.paths import pull_path
-from osimlite.simulation.kernels.pointers import at
-from osimlite.simulation.kernels.table import LAW_MODULES, law_function
+from osimlite.simulation.elements.laws import law_function
 
 TABLE = 3, 4
 

@@ -16,13 +16,13 @@ from osimlite import Body, FreeJoint, Model, PhysicalOffsetFrame, PinJoint
 from osimlite.errors import SimulationError
 from osimlite.fitting.pose_fit import PoseFit
 from osimlite.fitting.pose_layout import Goal, Marker, Sensor
+from osimlite.kernels import pose_cost, pose_record
+from osimlite.kernels.pose_fit import weigh
 from osimlite.multibody import functions as f
 from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
 from osimlite.multibody.spatial import rotation_xyz, transform
 from osimlite.simulation.engines.linking import COMPILED, PYTHON
-from osimlite.simulation.kernels import pose_cost, pose_record
-from osimlite.simulation.kernels.pose_fit import weigh
 from tests.multibody.strategies import Case, cases, constraint_of
 
 ROUND = "ConstantCurvatureJoint"

@@ -12,8 +12,7 @@ from typing import get_type_hints
 
 import pytest
 
-from osimlite import forces
-from osimlite.simulation import kernels
+from osimlite import forces, kernels
 from osimlite.simulation.elements.kind import Kind, kinds
 
 BUILT_IN = {"abs", "bool", "float", "int", "max", "min", "range"}

@@ -11,10 +11,10 @@ pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 import osimlite
 from osimlite.errors import OsimliteError
+from osimlite.kernels.walks import FEEL
 from osimlite.models.walking import write_scenario
 from osimlite.reflexes.parameters import Parameters
 from osimlite.reflexes.scenario import Candidates, Scenario
-from osimlite.simulation.kernels.walks import FEEL
 from tests.conftest import ROOT
 
 ARM = """

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.kernels import record
+from osimlite.kernels.layout import MODEL, WORK
+from osimlite.kernels.table import LAW_NUMBERS
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.linking import PYTHON, Program
-from osimlite.simulation.kernels import record
-from osimlite.simulation.kernels.layout import MODEL, WORK
-from osimlite.simulation.kernels.pack import Packed
-from osimlite.simulation.kernels.table import LAW_NUMBERS
+from osimlite.simulation.pack import Packed
 
 
 def oscillator(t, y):

@@ -8,9 +8,9 @@ import pytest
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 from osimlite.errors import SimulationError
+from osimlite.kernels.layout import MODEL, RUN
 from osimlite.models.jumper import jumper
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
-from osimlite.simulation.kernels.layout import MODEL, RUN
 from osimlite.simulation.run import Simulation
 
 

@@ -38,10 +38,10 @@ from osimlite.simulation.elements import Forces, force_elements
 
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
+from osimlite.kernels.layout import OUTCOME, STAGE
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.kernels.layout import OUTCOME, STAGE
 from osimlite.simulation.system import System
 
 NO_BULLET = "needs pybullet (extra 'bullet')"

@@ -25,11 +25,11 @@ from tests.simulation.test_constrained import MODELS, four_bars, knee, patella, 
 
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
+from osimlite.kernels import least_squares as ls
+from osimlite.kernels.layout import MODEL, OUTCOME, STAGE, WORK
+from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON
-from osimlite.simulation.kernels import least_squares as ls
-from osimlite.simulation.kernels.layout import MODEL, OUTCOME, STAGE, WORK
-from osimlite.simulation.kernels.table import law_function
 from osimlite.simulation.many import ENDINGS, Watch, run_many
 from osimlite.simulation.system import System
 

@@ -23,12 +23,12 @@ from osimlite.simulation.elements.kind import kinds as declared_kinds
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
+from osimlite.kernels.layout import OUTCOME, STAGE
 from osimlite.simulation.elements.external_loads import external_load
 from osimlite.simulation.elements.geometries.load import Load
 from osimlite.simulation.engines.bullet.engine import BulletEngine
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON
-from osimlite.simulation.kernels.layout import OUTCOME, STAGE
 from osimlite.simulation.system import System
 from tests.simulation.force_cases import FORCES, chain, contact, floor, stone, with_force
 

@@ -15,9 +15,9 @@ from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
 from osimlite.errors import OsimliteError
+from osimlite.kernels.pointers import Floats, Ints, at
+from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.engines import compiler, object_code, side_by_side
-from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.table import law_function
 
 MOVED = "numba {} is not as osimlite/simulation/engines/compiler.py takes it: {}"
 

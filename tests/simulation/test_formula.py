@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.errors import ModelError
-from osimlite.simulation.elements.formula import FUNCTIONS, Formula
-from osimlite.simulation.kernels.programs import STEPS, of_two, program
+from osimlite.forces.formulas import FUNCTIONS
+from osimlite.kernels.programs import STEPS, of_two
+from osimlite.simulation.elements.formula import Formula, program
 
 
 def value(text, q=0.7, u=-1.3):

@@ -11,13 +11,13 @@ import pytest
 
 import osimlite
 from osimlite.errors import SettingError
+from osimlite.kernels.condensation import condensation_room, condense, correct, linearise
+from osimlite.kernels.layout import MODEL, OUTCOME, STAGE
 from osimlite.multibody import build_mechanism
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.linking import PYTHON
-from osimlite.simulation.kernels.condensation import condensation_room, condense, correct, linearise
-from osimlite.simulation.kernels.layout import MODEL, OUTCOME, STAGE
 from osimlite.simulation.many import run_many
 from osimlite.simulation.system import System
 from tests.simulation.elements.muscle_rows import hung, muscle

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.kernels.layout import MODEL
 from osimlite.multibody import build_mechanism
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.kernels.layout import MODEL
 from tests.simulation.checked import Checked, bounded
 from tests.simulation.force_cases import FORCES, with_force
 from tests.simulation.test_compiled_forces import states

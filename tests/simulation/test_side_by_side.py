@@ -8,8 +8,9 @@ import pytest
 
 pytest.importorskip("numba", reason="needs numba (extra 'fast')")
 
+from osimlite.kernels.table import LAW_MODULES
+from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.engines import machine_code, object_code, side_by_side
-from osimlite.simulation.kernels.table import LAW_MODULES, law_function
 
 LAWS = ("contact_places", "place_drift")
 

@@ -6,9 +6,10 @@ from types import FunctionType
 
 import pytest
 
+from osimlite.kernels import constrained_dynamics, least_squares, pointers
+from osimlite.kernels.table import LAW_MODULES
+from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.engines import sources
-from osimlite.simulation.kernels import constrained_dynamics, least_squares, pointers
-from osimlite.simulation.kernels.table import LAW_MODULES, law_function
 
 
 def digests():

@@ -9,11 +9,11 @@ from math import isnan
 import numpy as np
 import pytest
 
+from osimlite.kernels import wrapping
+from osimlite.kernels.layout import ITEM
+from osimlite.kernels.wrap_cylinder import settled
 from osimlite.multibody.spatial import inverse, offset, transform
 from osimlite.simulation.engines.linking import COMPILED
-from osimlite.simulation.kernels import wrapping
-from osimlite.simulation.kernels.layout import ITEM
-from osimlite.simulation.kernels.wrap_cylinder import settled
 from tests.conftest import ROOT
 from tests.simulation.checked import Checked
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from osimlite.backends.symbolic import on_symbols
 from osimlite.backends.symbols import Vector
 from osimlite.errors import ModelError, SettingError
+from osimlite.kernels.programs import compute
 from osimlite.optimal.point import Ends, Terms
 from osimlite.optimal.point import Formula as Value
 from osimlite.optimal.problem import Problem
 from osimlite.schema.moco.goals import MocoExpressionBasedParameterGoal
-from osimlite.simulation.elements.formula import Formula
-from osimlite.simulation.kernels.programs import compute, program
+from osimlite.simulation.elements.formula import Formula, program
 from osimlite.sweep.properties import places
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.forces.hunt_crossley import combine_materials, contact_energy
 from osimlite.forces.vectors import cross, minus, plus, vector
+from osimlite.kernels.layout import CONTACT_WORK, ITEM
 from osimlite.multibody.spatial import Array, offset
 from osimlite.records import dataclass
 from osimlite.schema.contact import ContactEllipsoid, ContactGeometry, ContactHalfSpace, ContactSphere
@@ -18,7 +19,6 @@ from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.tree import Use
 from osimlite.simulation.elements.gather import ElementBuilder, Triple, kind_of, triple
 from osimlite.simulation.elements.items import Item, Places, Response
-from osimlite.simulation.kernels.layout import CONTACT_WORK, ITEM
 from osimlite.simulation.states import StateVariable
 
 if TYPE_CHECKING:

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from osimlite.errors import UnsupportedError
+from osimlite.kernels.layout import ITEM, WORK
+from osimlite.multibody.function_tables import table_of_one
 from osimlite.multibody.functions import Function
 from osimlite.records import dataclass, replace
 from osimlite.schema.actuators import Actuator
@@ -16,8 +18,6 @@ from osimlite.schema.base import Unknown
 from osimlite.schema.controller_types import ControlSetController, TrackingController
 from osimlite.schema.controllers import Controller
 from osimlite.simulation.elements.integral import value_of
-from osimlite.simulation.kernels.functions import table_of_one
-from osimlite.simulation.kernels.layout import ITEM, WORK
 
 if TYPE_CHECKING:
     from osimlite.simulation.elements.gather import ElementBuilder

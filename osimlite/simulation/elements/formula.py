@@ -12,39 +12,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from osimlite.errors import ModelError
+from osimlite.forces.formulas import FUNCTIONS, OF_TWO
+from osimlite.kernels.programs import STEPS
 from osimlite.records import dataclass
 from osimlite.text import counted, did_you_mean, listed
 
-FUNCTIONS = {
-    "sqrt": "square_root",
-    "exp": "exponential",
-    "log": "logarithm",
-    "sin": "sine",
-    "cos": "cosine",
-    "sec": "secant",
-    "csc": "cosecant",
-    "tan": "tangent",
-    "cot": "cotangent",
-    "asin": "arcsine",
-    "acos": "arccosine",
-    "atan": "arctangent",
-    "sinh": "hyperbolic_sine",
-    "cosh": "hyperbolic_cosine",
-    "tanh": "hyperbolic_tangent",
-    "erf": "error_function",
-    "erfc": "complementary_error_function",
-    "step": "unit_step",
-    "delta": "is_zero",
-    "square": "square",
-    "cube": "cube",
-    "recip": "reciprocal",
-    "min": "smaller",
-    "max": "larger",
-    "abs": "magnitude",
-}
-"""The law for each of Lepton's functions."""
-
-OF_TWO = ("min", "max")
 DERIVATIVES = {
     "+": ("1", "1"),
     "-": ("1", "-1"),
@@ -260,3 +232,16 @@ class _Reader:
                 raise _Wrong(f"'{name}' takes {counted(wanted, 'argument')}, not {given}")
             self._take(opened)
         return False
+
+
+def program(formula: Formula) -> tuple[list[int], list[float]]:
+    """Steps and constants of a formula, as `compute` takes them."""
+    steps: list[int] = []
+    constants: list[float] = []
+    for step in formula.steps:
+        one, two, *_ = *step.arguments, 0, 0
+        if step.law == "number":
+            one = len(constants)
+            constants.append(step.value)
+        steps += STEPS.index(step.law), one, two
+    return steps, constants

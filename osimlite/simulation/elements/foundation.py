@@ -15,6 +15,10 @@ import numpy as np
 from osimlite.errors import ModelError
 from osimlite.forces.elastic_foundation import spring_load
 from osimlite.forces.vectors import ZERO, Vector, minus, plus, times
+from osimlite.kernels.layout import ITEM, LINK_WORK, MODEL
+from osimlite.kernels.meshes import MESH_WORK, load_mesh
+from osimlite.kernels.pointers import Floats, Ints
+from osimlite.kernels.points import angular_velocity, station, velocity
 from osimlite.multibody.spatial import Array, transform
 from osimlite.records import dataclass
 from osimlite.schema.contact import ContactMesh
@@ -31,10 +35,6 @@ from osimlite.simulation.elements.contact import (
 from osimlite.simulation.elements.gather import ElementBuilder, triple
 from osimlite.simulation.elements.items import Item, Placement, Places
 from osimlite.simulation.elements.triangle_mesh import TriangleMesh
-from osimlite.simulation.kernels.layout import ITEM, LINK_WORK, MODEL
-from osimlite.simulation.kernels.meshes import MESH_WORK, load_mesh
-from osimlite.simulation.kernels.pointers import Floats, Ints
-from osimlite.simulation.kernels.points import angular_velocity, station, velocity
 
 Load = tuple[Vector, Vector, float]
 """Force (N), torque about a point (N·m), and energy (J)."""

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import linecache
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from osimlite.kernels.condensation import WIDTH
+from osimlite.kernels.curves_abreast import LANES, answer, ask, slope_of, value_of
+from osimlite.kernels.layout import ITEM
+from osimlite.kernels.written import written
 from osimlite.records import dataclass
-from osimlite.simulation.kernels import pointers
-from osimlite.simulation.kernels.condensation import WIDTH
-from osimlite.simulation.kernels.curves_abreast import LANES, answer, ask, slope_of, value_of
-from osimlite.simulation.kernels.layout import ITEM, MODEL, OUTCOME, RUN, WORK
-from osimlite.simulation.kernels.table import ABREAST, EQUILIBRIUM, OFF, RESPONSE, RIGID
+from osimlite.simulation.elements.laws import ABREAST, EQUILIBRIUM, OFF, RESPONSE, RIGID
 
 if TYPE_CHECKING:
     from osimlite.simulation.elements.kind import Kind, State
@@ -20,9 +19,6 @@ if TYPE_CHECKING:
 
 SOLVED = "solved"
 """The output that tells whether the law has a solution; without it, it always has one."""
-
-RECORDS = {record.__name__: record for record in (MODEL, ITEM, RUN, WORK, OUTCOME)}
-"""What the code of kernels uses of the layout."""
 
 SMALL_CHANGE = 1e-7
 """Of lengths (m), angles, speeds and states, to find derivatives."""
@@ -91,7 +87,7 @@ class KernelText:
     def response_kernel(self) -> Callable[..., int]:
         """The function that applies 1 of a force along a displacement, and leaves its derivatives in SCRATCH.
 
-        A row for the force and for the rate of each state, see :mod:`osimlite.simulation.kernels.condensation`.
+        A row for the force and for the rate of each state, see :mod:`osimlite.kernels.condensation`.
         """
         kind, outputs = self.kind, self.kind.outputs
         force, _ = kind.geometry.along
@@ -295,20 +291,3 @@ def arguments_of(terms: Iterable[Parameter], head: int, number: int) -> list[str
         result += term.arguments(head, number)
         head, number = head + term.heads, number + term.size
     return result
-
-
-def written(name: str, module: str, source: str, **scope: Any) -> Callable[..., int]:
-    """A kernel that was written.
-
-    Args:
-        name: of it.
-        module: that it belongs to.
-        source: its text.
-        scope: what this uses, besides the layout.
-    """
-    known = {**RECORDS, "at": pointers.at, "__name__": module, **scope}
-    file = f"<kernel {name}>"
-    exec(compile(source, file, "exec", dont_inherit=True), known)
-    # Tracebacks and `inspect.getsource` show it as they show a file.
-    linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-    return known[name]

@@ -20,6 +20,7 @@ from pkgutil import iter_modules
 from typing import Any, ClassVar
 
 from osimlite._load import module_name
+from osimlite.kernels.layout import ITEM
 from osimlite.records import dataclass, field
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.states import states_of
@@ -28,9 +29,8 @@ from osimlite.simulation.elements.gather import ElementBuilder, module_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places, Response, Silent
 from osimlite.simulation.elements.kernel_text import SOLVED, Abreast, KernelText
+from osimlite.simulation.elements.laws import ABREAST, EQUILIBRIUM, OFF, RESPONSE, RIGID
 from osimlite.simulation.elements.parameters import Control, Fields, Number, Parameter, ReflexControl, Tail
-from osimlite.simulation.kernels.layout import ITEM
-from osimlite.simulation.kernels.table import ABREAST, EQUILIBRIUM, OFF, RESPONSE, RIGID
 from osimlite.simulation.states import StateVariable
 
 ENERGY = "energy"

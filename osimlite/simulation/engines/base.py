@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from math import inf
 from typing import Self
 
+from osimlite.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.integrators import MERSON
-from osimlite.simulation.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.stepper import Observer, Stepper
 from osimlite.simulation.system import System
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite.simulation import kernels
+from osimlite import kernels
+from osimlite.kernels import record
+from osimlite.kernels.condensation import condensation_room
+from osimlite.kernels.layout import MODEL
+from osimlite.kernels.method import ERRORS
+from osimlite.kernels.pointers import Floats, Ints
+from osimlite.kernels.table import LAW_MODULES
 from osimlite.simulation.integrators import INITIAL_STEP
-from osimlite.simulation.kernels import record
-from osimlite.simulation.kernels.condensation import condensation_room
-from osimlite.simulation.kernels.layout import MODEL
-from osimlite.simulation.kernels.method import ERRORS
-from osimlite.simulation.kernels.pointers import Floats, Ints
-from osimlite.simulation.kernels.table import LAW_MODULES
 from osimlite.simulation.many import BatchOptions
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class Batch:
 
     Attributes:
         clocks: time and next step of each run, s (W, 2).
-        counts: see :mod:`osimlite.simulation.kernels.record` (W, 6).
+        counts: see :mod:`osimlite.kernels.record` (W, 6).
         states: at the end (W, y).
         endings: of the runs (W,).
         reports: states at the times (W, r, y), not a number after the end of a run.
@@ -110,7 +110,7 @@ class Batch:
         self._call("run_several", vectors, room, each, *own, *parts)
 
     def hold(self, law: str, room: Floats, numbers: Floats, *parts: Any) -> int:
-        """Compute by a law of :mod:`osimlite.simulation.kernels.walks`, with what it takes besides.
+        """Compute by a law of :mod:`osimlite.kernels.walks`, with what it takes besides.
 
         Args:
             law: its name.

@@ -1,6 +1,6 @@
 """The compiled engine: accelerations, steps and events in machine code.
 
-What is compiled are the functions of :mod:`osimlite.simulation.kernels` with the force laws and the step control that
+What is compiled are the functions of :mod:`osimlite.kernels` with the force laws and the step control that
 they call. The code serves every model: models and parameters are arrays.
 """
 

@@ -1,4 +1,4 @@
-"""From functions of :mod:`osimlite.simulation.kernels` to the intermediate language of LLVM, by numba.
+"""From functions of :mod:`osimlite.kernels` to the intermediate language of LLVM, by numba.
 
 The kernels know of no compiler. An entry is compiled with the functions that it calls within. It takes addresses of
 arrays and numbers, holds no reference to any Python object, and runs without Python's lock. Numba would make machine
@@ -20,9 +20,9 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 from osimlite._require import require
+from osimlite.kernels import pointers
+from osimlite.kernels.layout import Record
 from osimlite.simulation.engines.object_code import machine
-from osimlite.simulation.kernels import pointers
-from osimlite.simulation.kernels.layout import Record
 
 numba = require("numba", extra="sim", purpose="the compiled engine")
 

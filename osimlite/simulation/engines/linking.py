@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.kernels import pointers
+from osimlite.kernels.layout import MODEL, OUTCOME
+from osimlite.kernels.pointers import Ints
+from osimlite.kernels.table import LAW_NUMBERS
+from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.interrupts import defer_sigint
-from osimlite.simulation.kernels import pointers
-from osimlite.simulation.kernels.layout import MODEL, OUTCOME
-from osimlite.simulation.kernels.pack import Packed
-from osimlite.simulation.kernels.pointers import Ints
-from osimlite.simulation.kernels.table import LAW_NUMBERS, law_function
+from osimlite.simulation.pack import Packed
 
 _log = logging.getLogger(__name__)
 

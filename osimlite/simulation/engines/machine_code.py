@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
+from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.engines.sources import digest_of
-from osimlite.simulation.kernels.table import law_function
 
 if TYPE_CHECKING:
     from osimlite.simulation.engines.side_by_side import Made

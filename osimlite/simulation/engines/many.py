@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from osimlite._cores import cores
 from osimlite.errors import OsimliteError
+from osimlite.kernels import record
+from osimlite.kernels.contacts import RADIUS
+from osimlite.kernels.layout import ITEM, MODEL
+from osimlite.kernels.pointers import Floats, Ints
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.kernels import record
-from osimlite.simulation.kernels.contacts import RADIUS
-from osimlite.simulation.kernels.layout import ITEM, MODEL
-from osimlite.simulation.kernels.pointers import Floats, Ints
 from osimlite.simulation.many import BatchOptions
 from osimlite.simulation.runs import Runs, Watch
 from osimlite.text import did_you_mean

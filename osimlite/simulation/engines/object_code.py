@@ -180,7 +180,7 @@ def _folders() -> Iterator[Path]:
     if os.environ.get(FOLDER):
         yield Path(os.environ[FOLDER])
         return
-    yield Path(__file__).parents[1] / "kernels" / "__pycache__"
+    yield Path(__file__).parents[2] / "kernels" / "__pycache__"
     home: str | Path | None = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
     if not home:
         try:

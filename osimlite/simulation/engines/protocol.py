@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Protocol
 
+from osimlite.kernels.pointers import Floats
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.records import dataclass
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, NO_BOUNDS
-from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import Observer, Stepper
 

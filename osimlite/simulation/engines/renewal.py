@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from osimlite.kernels.layout import ITEM, MODEL
+from osimlite.kernels.pointers import Floats
 from osimlite.multibody.build import mass_properties
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.mechanism import Mechanism
@@ -22,10 +24,8 @@ from osimlite.simulation.elements.controls import Controls, ModelControls
 from osimlite.simulation.elements.items import Item, Places
 from osimlite.simulation.elements.kind import kind_of_class
 from osimlite.simulation.elements.probe import DeclaredProbe, probe_elements
-from osimlite.simulation.kernels.layout import ITEM, MODEL
-from osimlite.simulation.kernels.pack import pack
-from osimlite.simulation.kernels.pointers import Floats
 from osimlite.simulation.many import Renewed
+from osimlite.simulation.pack import pack
 
 if TYPE_CHECKING:
     from osimlite.simulation.engines.compiled import CompiledEngine

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 from osimlite._cores import cores
 from osimlite.errors import OsimliteError
+from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.engines.sources import digest_of, functions_within
-from osimlite.simulation.kernels.table import law_function
 
 SHARE = 14_000
 """So much Python code (bytes) is worth a process of its own: less is compiled before that has loaded the compiler."""

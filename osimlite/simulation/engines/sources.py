@@ -13,7 +13,7 @@ from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any
 
-from osimlite.simulation.kernels.layout import Record
+from osimlite.kernels.layout import Record
 
 
 @cache

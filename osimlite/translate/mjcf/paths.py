@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from osimlite.kernels.paths import CONDITIONAL, MOVING
 from osimlite.multibody.mechanism import GROUND
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass, field
 from osimlite.schema.forces import Force
 from osimlite.schema.paths import AbstractGeometryPath
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
-from osimlite.simulation.kernels.paths import CONDITIONAL, MOVING
 from osimlite.simulation.paths import Paths
 from osimlite.translate.fidelity import LEFT_OUT, Error
 from osimlite.translate.mjcf.bodies import LEAST_MASS

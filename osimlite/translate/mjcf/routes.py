@@ -12,10 +12,10 @@ from itertools import chain, combinations, groupby, pairwise, product
 
 import numpy as np
 
+from osimlite.kernels.paths import CONDITIONAL, MOVING
 from osimlite.multibody.spatial import Array, rotation_about, transform
 from osimlite.records import dataclass
 from osimlite.simulation.elements.geometries.paths.geometry_path import Node, ThroughPoints
-from osimlite.simulation.kernels.paths import CONDITIONAL, MOVING
 from osimlite.translate.mjcf.moving import composition
 from osimlite.translate.mjcf.poses import Places, Poses, Truth
 from osimlite.translate.mjcf.surfaces import stand_ins, z_to

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.errors import OsimliteError
-from osimlite.multibody.dynamics import SAFE_MASS
+from osimlite.kernels.constrained_dynamics import SAFE_MASS
 from osimlite.multibody.linear import solutions, stacked
 from osimlite.multibody.spatial import Array
 from osimlite.schema.forces import CoordinateLimitForce

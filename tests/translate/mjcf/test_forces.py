@@ -26,10 +26,10 @@ from osimlite import (
     TorqueActuator,
     UniversalJoint,
 )
+from osimlite.kernels.layout import STAGE
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.linking import PYTHON
 from osimlite.simulation.given_controls import driven
-from osimlite.simulation.kernels.layout import STAGE
 from osimlite.simulation.system import System
 from osimlite.translate import to_mjcf
 from tests.translate.mjcf.compiled import Compiled

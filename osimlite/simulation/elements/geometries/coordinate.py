@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from osimlite.kernels.layout import MODEL
+from osimlite.kernels.pointers import Floats, Ints
 from osimlite.records import dataclass
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
-from osimlite.simulation.kernels.layout import MODEL
-from osimlite.simulation.kernels.pointers import Floats, Ints
 
 
 def coordinate(s: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, float]:

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from osimlite.forces.vectors import dot, minus, norm, put, times, vector
+from osimlite.kernels.pointers import Floats, Ints
+from osimlite.kernels.points import apply_force, station, velocity
 from osimlite.records import dataclass
 from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
-from osimlite.simulation.kernels.pointers import Floats, Ints
-from osimlite.simulation.kernels.points import apply_force, station, velocity
 
 
 def line(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float]:

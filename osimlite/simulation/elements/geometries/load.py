@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from osimlite.forces.vectors import dot, minus, plus, put, turned_back, vector
+from osimlite.kernels.functions import value_at
+from osimlite.kernels.pointers import Floats, Ints, at
+from osimlite.kernels.points import apply_force, apply_torque, direction, station
+from osimlite.multibody.function_tables import table_of_one
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import FramePlacement
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Places
-from osimlite.simulation.kernels.functions import table_of_one, value_at
-from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.points import apply_force, apply_torque, direction, station
 
 FRAME = 12
 """Numbers of a frame: rotation by columns and origin in its link."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
+from osimlite.kernels.paths import path_length, pull_path
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of, module_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Places
-from osimlite.simulation.kernels.paths import path_length, pull_path
 
 
 class Path(Protocol):
@@ -16,7 +16,7 @@ class Path(Protocol):
     coupled: bool  # whether its moment arm about a coordinate takes in those that must move with that
 
     def items(self, places: Places) -> list[Item]:
-        """Parts, of which the last is the path's own; see :mod:`osimlite.simulation.kernels.paths`."""
+        """Parts, of which the last is the path's own; see :mod:`osimlite.kernels.paths`."""
 
 
 class AlongPath(Geometry):

@@ -2,11 +2,11 @@
 
 from osimlite.forces.bushing import bushing_dissipation, bushing_load
 from osimlite.forces.springs import spring_energy
+from osimlite.kernels.pointers import Floats
 from osimlite.schema.springs import BushingForce
 from osimlite.simulation.elements.geometries.frames import BetweenFrames, damped
 from osimlite.simulation.elements.kind import Kind, State
 from osimlite.simulation.elements.parameters import Vector
-from osimlite.simulation.kernels.pointers import Floats
 
 
 def bushing(

@@ -1,11 +1,11 @@
 """A bushing whose loads are formulas of all its deviations; its energy is not known."""
 
+from osimlite.kernels.pointers import Floats, Ints, at
+from osimlite.kernels.programs import compute
 from osimlite.schema.springs import ExpressionBasedBushingForce
 from osimlite.simulation.elements.geometries.frames import BetweenFrames, damp
 from osimlite.simulation.elements.kind import Kind
 from osimlite.simulation.elements.parameters import Expressions, Vector
-from osimlite.simulation.kernels.pointers import Floats, Ints, at
-from osimlite.simulation.kernels.programs import compute
 
 VARIABLES = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
 

@@ -1,10 +1,10 @@
 """A force between two points by a formula, positive where it pulls; its energy is not known."""
 
+from osimlite.kernels.programs import of_two
 from osimlite.schema.springs import ExpressionBasedPointToPointForce
 from osimlite.simulation.elements.geometries.line import BetweenPoints
 from osimlite.simulation.elements.kind import Kind
 from osimlite.simulation.elements.parameters import Expression
-from osimlite.simulation.kernels.programs import of_two
 
 KIND = Kind(
     ExpressionBasedPointToPointForce,

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
+from osimlite.kernels.functions import value_at
+from osimlite.kernels.pointers import Floats
 from osimlite.schema.springs import FunctionBasedBushingForce
 from osimlite.simulation.elements.geometries.frames import DEVIATIONS, BetweenFrames, damp
 from osimlite.simulation.elements.integral import integral
 from osimlite.simulation.elements.kind import DeclaredForce, Kind
 from osimlite.simulation.elements.parameters import Curve, Vector
-from osimlite.simulation.kernels.functions import value_at
-from osimlite.simulation.kernels.pointers import Floats
 
 
 def bushing(

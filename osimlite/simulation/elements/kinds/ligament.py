@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
+from osimlite.kernels.functions import value_at
+from osimlite.kernels.pointers import Floats
 from osimlite.schema.path_forces import Ligament
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.integral import integral
 from osimlite.simulation.elements.kind import DeclaredForce, Kind
 from osimlite.simulation.elements.parameters import Curve, positive
-from osimlite.simulation.kernels.functions import value_at
-from osimlite.simulation.kernels.pointers import Floats
 
 
 def ligament(length: float, l0: float, force: float, curve: Floats) -> tuple[float, float]:

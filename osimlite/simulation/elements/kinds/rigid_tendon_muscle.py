@@ -4,11 +4,11 @@ from math import sqrt
 from typing import NamedTuple
 
 from osimlite.forces.muscles import MuscleInputs
+from osimlite.kernels.functions import value_at
+from osimlite.kernels.pointers import Floats
 from osimlite.schema.muscles import RigidTendonMuscle
 from osimlite.simulation.elements.muscle import height, muscle
 from osimlite.simulation.elements.parameters import Curve, Fields, Number, Together, positive
-from osimlite.simulation.kernels.functions import value_at
-from osimlite.simulation.kernels.pointers import Floats
 
 PARALLEL = 2.0**-26
 """Fibers that are no higher (m) are in line with the tendon: Simbody's SqrtEps."""

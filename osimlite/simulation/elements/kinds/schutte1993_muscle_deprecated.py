@@ -11,12 +11,12 @@ from osimlite.forces.old_muscles import (
     schutte_passive_force,
     schutte_velocity,
 )
+from osimlite.kernels.functions import value_at
+from osimlite.kernels.pointers import Floats
 from osimlite.schema.old_muscles import Schutte1993Muscle_Deprecated
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.old_muscle import fibers_at, isometric_length, old_muscle, recorded, strongest
 from osimlite.simulation.elements.parameters import Curve, Fields, Number, Together, positive
-from osimlite.simulation.kernels.functions import value_at
-from osimlite.simulation.kernels.pointers import Floats
 
 
 class SchutteCurves(NamedTuple):

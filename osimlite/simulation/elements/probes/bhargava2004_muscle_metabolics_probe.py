@@ -6,12 +6,12 @@ from functools import partial
 from typing import Any
 
 from osimlite.forces.metabolics import Bhargava2004, bhargava2004
+from osimlite.kernels.functions import value_at
+from osimlite.kernels.pointers import Floats
 from osimlite.schema.metabolics import Bhargava2004MuscleMetabolicsProbe
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.metabolic import metabolic
 from osimlite.simulation.elements.probe import ProbeKind, Reading
-from osimlite.simulation.kernels.functions import value_at
-from osimlite.simulation.kernels.pointers import Floats
 
 
 def _law(

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from osimlite.errors import OsimliteError, SimulationError, UnsupportedError
+from osimlite.kernels.layout import CHAIN, MODEL
+from osimlite.kernels.pointers import Floats, Ints
 from osimlite.multibody.constraints import Lock
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
@@ -30,9 +32,7 @@ from osimlite.simulation.engines.bullet.file import excess, require_masses
 from osimlite.simulation.engines.bullet.stepper import BulletStepper
 from osimlite.simulation.engines.bullet.world import World, bullet
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.kernels.layout import CHAIN, MODEL
-from osimlite.simulation.kernels.pack_chain import Chain
-from osimlite.simulation.kernels.pointers import Floats, Ints
+from osimlite.simulation.pack_chain import Chain
 from osimlite.simulation.stepper import Observer, Stepper
 
 if TYPE_CHECKING:
@@ -122,7 +122,7 @@ class BulletEngine(KernelEngine):
 
     # ---------------------------------------------------------------------------------------- accelerations
     def _supply_matrix(self, s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> None:
-        """Mass matrix and bias; see :class:`osimlite.simulation.kernels.pack_chain.Chain`."""
+        """Mass matrix and bias; see :class:`osimlite.simulation.pack_chain.Chain`."""
         robot, client, first = self._body.id, self._body.client, self._forces
         values, rates, accelerations = w[self._moves : first].reshape(3, -1).tolist()
         try:

@@ -13,10 +13,10 @@ import osimlite
 from osimlite import Body, Coordinate, Model
 from osimlite.errors import OsimliteError
 from osimlite.multibody import build_mechanism
+from osimlite.simulation import pack_chain
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler
-from osimlite.simulation.kernels import pack_chain
 
 bullet = pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 

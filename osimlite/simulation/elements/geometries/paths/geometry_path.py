@@ -13,6 +13,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from osimlite.errors import ModelError
+from osimlite.kernels.cable_surfaces import CYLINDER, ELLIPSOID, SPHERE, TORUS
+from osimlite.kernels.geodesic_paths import slots_and_room
+from osimlite.kernels.layout import ITEM
+from osimlite.kernels.path_wraps import SURFACE_WORK
+from osimlite.kernels.paths import CLAMPED, CONDITIONAL, FIXED, MOVING, NODE_WORK, ORDER, TANGENT
+from osimlite.kernels.wrap_curves import MOST
+from osimlite.kernels.wrapping import AXIAL, HYBRID, MIDPOINT
+from osimlite.multibody.function_tables import table_of_one
 from osimlite.multibody.functions import Function
 from osimlite.multibody.spatial import Array, offset
 from osimlite.records import dataclass, replace
@@ -21,14 +29,6 @@ from osimlite.schema.paths import AbstractPathPoint, ConditionalPathPoint, Movin
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere, WrapTorus
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of
 from osimlite.simulation.elements.items import Item, Places
-from osimlite.simulation.kernels.cable_surfaces import CYLINDER, ELLIPSOID, SPHERE, TORUS
-from osimlite.simulation.kernels.functions import table_of_one
-from osimlite.simulation.kernels.geodesic_paths import slots_and_room
-from osimlite.simulation.kernels.layout import ITEM
-from osimlite.simulation.kernels.path_wraps import SURFACE_WORK
-from osimlite.simulation.kernels.paths import CLAMPED, CONDITIONAL, FIXED, MOVING, NODE_WORK, ORDER, TANGENT
-from osimlite.simulation.kernels.wrap_curves import MOST
-from osimlite.simulation.kernels.wrapping import AXIAL, HYBRID, MIDPOINT
 
 TOLERANCE = 1e-5
 """A conditional point counts so far outside its range, in OpenSim."""
@@ -216,7 +216,7 @@ def _surface(builder: ElementBuilder, wrap: Any, surface: Any, number: int, alon
 
 
 def _geodesic(surface: WrapObject) -> tuple[float, ...]:
-    """Half the length of a surface, and its numbers in :mod:`osimlite.simulation.kernels.cable_surfaces`."""
+    """Half the length of a surface, and its numbers in :mod:`osimlite.kernels.cable_surfaces`."""
     if isinstance(surface, WrapCylinder):
         return surface.length / 2.0, CYLINDER, surface.radius, surface.radius**2, 1.0, 1.0, 0.0
     if isinstance(surface, WrapSphere):

@@ -11,14 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from osimlite.errors import ModelError
-from osimlite.multibody.mechanism import GROUND, Mechanism
-from osimlite.multibody.spatial import Array, offset
-from osimlite.records import dataclass, replace
-from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactGeometry, ContactSphere, ContactTorus
-from osimlite.schema.scholz_paths import Scholz2015GeometryPathPoint
-from osimlite.simulation.elements.gather import ElementBuilder, kind_of
-from osimlite.simulation.elements.items import Item, Placement, Places
-from osimlite.simulation.kernels.cable_paths import (
+from osimlite.kernels.cable_paths import (
     ELEMENT_INTS,
     ELEMENTS,
     FIRST,
@@ -34,10 +27,17 @@ from osimlite.simulation.kernels.cable_paths import (
     cable_path,
     solver_room,
 )
-from osimlite.simulation.kernels.cable_surfaces import CYLINDER, ELLIPSOID, END, POINT, SPHERE, START, STEP, TORUS
-from osimlite.simulation.kernels.layout import ITEM
-from osimlite.simulation.kernels.paths import LENGTH
-from osimlite.simulation.kernels.wrap_curves import MOST
+from osimlite.kernels.cable_surfaces import CYLINDER, ELLIPSOID, END, POINT, SPHERE, START, STEP, TORUS
+from osimlite.kernels.layout import ITEM
+from osimlite.kernels.paths import LENGTH
+from osimlite.kernels.wrap_curves import MOST
+from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.multibody.spatial import Array, offset
+from osimlite.records import dataclass, replace
+from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactGeometry, ContactSphere, ContactTorus
+from osimlite.schema.scholz_paths import Scholz2015GeometryPathPoint
+from osimlite.simulation.elements.gather import ElementBuilder, kind_of
+from osimlite.simulation.elements.items import Item, Placement, Places
 
 FIRST_STEP = 1e-10
 """Of the first integration of a geodesic, m."""

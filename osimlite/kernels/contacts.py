@@ -1,0 +1,98 @@
+"""Hunt-Crossley contact of half spaces, spheres and ellipsoids.
+
+The numbers of a pair are the centre and the normal of surface 1 in its link, its radius, centre and radius of surface
+2, and k, a, c, us, ud, uv, vt of the law.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from osimlite.forces.hunt_crossley import contact_derivatives, contact_force, half_space_sphere, sphere_sphere
+from osimlite.forces.vectors import Vector, cross, minus, over, put, times, vector
+from osimlite.kernels.condensation import INVERSE
+from osimlite.kernels.layout import ITEM, OUTCOME, WORK
+from osimlite.kernels.pointers import Floats, Ints, at
+from osimlite.kernels.points import apply_force, direction, station, velocity
+
+RADIUS = 10
+"""Place of the radius of surface 2 among them."""
+
+
+def touch_half_space(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """A sphere on a half space."""
+    d, radius, n, point = on_half_space(s, x, w, item)
+    if d > 0.0:
+        press(s, x, w, item, d, radius, n, point)
+    return OUTCOME.OK
+
+
+def touch_spheres(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """Two spheres."""
+    d, radius, n, point = on_sphere(s, x, w, item)
+    if d > 0.0:
+        press(s, x, w, item, d, radius, n, point)
+    return OUTCOME.OK
+
+
+def on_half_space(s: Ints, x: Floats, w: Floats, item: int) -> tuple[float, float, Vector, Vector]:
+    """Depth, effective radius, normal and point of a sphere on a half space."""
+    i = at(s, item)
+    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(x, i[ITEM.NUMBERS])
+    o, n = station(s, w, one, vector(p, 0)), direction(s, w, one, vector(p, 3))
+    d, point = half_space_sphere(o, n, station(s, w, two, vector(p, 7)), p[10], p[12])
+    return d, p[10], n, point
+
+
+def on_sphere(s: Ints, x: Floats, w: Floats, item: int) -> tuple[float, float, Vector, Vector]:
+    """Depth, effective radius, normal and point of two spheres."""
+    i = at(s, item)
+    p = at(x, i[ITEM.NUMBERS])
+    one, two = station(s, w, i[ITEM.OWN], vector(p, 0)), station(s, w, i[ITEM.OWN + 1], vector(p, 7))
+    return sphere_sphere(one, p[6], two, p[10], p[12])
+
+
+def contact_response(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """Apply 1 N along the normal of a contact or across it, and leave in SCRATCH how its force there changes.
+
+    The integers of the item are how far before it that of the contact is, 0 along the normal, 1 and 2 across it, and
+    whether surface 1 is a half space. That friction depends on the normal force is left out: it makes the equations of
+    :mod:`osimlite.kernels.condensation` lose their symmetry.
+    """
+    i, change = at(s, item), at(w, WORK.SCRATCH)
+    pair, axis = item - i[ITEM.OWN], i[ITEM.OWN + 1]
+    for k in range(INVERSE):
+        change[k] = 0.0
+    d, radius, n, point = on_half_space(s, x, w, pair) if i[ITEM.OWN + 2] > 0 else on_sphere(s, x, w, pair)
+    if d > 0.0:
+        one, two, p = s[pair + ITEM.OWN], s[pair + ITEM.OWN + 1], at(x, s[pair + ITEM.NUMBERS])
+        v = minus(velocity(s, w, one, point), velocity(s, w, two, point))
+        pressed, damped, dragged = contact_derivatives(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
+        way = n
+        if axis > 0:
+            # Any two directions across the normal do.
+            nx, ny, nz = n
+            way = over(cross(n, (1.0, 0.0, 0.0)), sqrt(ny * ny + nz * nz))
+            if abs(nx) > 0.7:
+                way = over(cross(n, (0.0, 1.0, 0.0)), sqrt(nx * nx + nz * nz))
+            change[1] = -dragged
+        else:
+            change[0], change[1] = -pressed, -damped
+        if axis > 1:
+            way = cross(n, way)
+        apply_force(s, w, two, point, way)
+        apply_force(s, w, one, point, times(-1.0, way))
+    return OUTCOME.OK
+
+
+def press(s: Ints, x: Floats, w: Floats, item: int, d: float, radius: float, n: Vector, point: Vector) -> None:
+    """The force of a contact of a depth at a point, on both surfaces and in the record."""
+    i = at(s, item)
+    one, two, p, result = i[ITEM.OWN], i[ITEM.OWN + 1], at(x, i[ITEM.NUMBERS]), at(w, i[ITEM.RECORD])
+    v = minus(velocity(s, w, one, point), velocity(s, w, two, point))
+    force = contact_force(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
+    put(result, 0, force)
+    put(result, 3, point)
+    result[6], result[7] = d, radius
+    apply_force(s, w, two, point, force)
+    apply_force(s, w, one, point, times(-1.0, force))

@@ -1,0 +1,280 @@
+"""Accelerations of a tree of links under gravity and whatever pushes.
+
+The composite-rigid-body algorithm gives the mass matrix, and a factorisation that keeps its zeros solves for the
+accelerations (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 6.2 and 6.5). Of the row of a degree of
+freedom only the entries of those on its way to ground are there, its own first. The cost grows with the number of
+degrees of freedom times the square of how many of them carry one another.
+"""
+
+from __future__ import annotations
+
+from osimlite.forces.vectors import ZERO, Vector, along, cross, dot, minus, plus, put, times, turned, vector
+from osimlite.kernels.layout import (
+    CHAIN,
+    CONSTRAINED,
+    CONTACT_WORK,
+    DOF,
+    EQUILIBRIUM_INTS,
+    INERTIA_AT,
+    ITEM,
+    LINK,
+    LINK_WORK,
+    MODEL,
+    OUTCOME,
+    RUN,
+    STAGE,
+)
+from osimlite.kernels.motion import move, place
+from osimlite.kernels.parts import link_ints, link_work
+from osimlite.kernels.pointers import Floats, Ints, at, call
+
+SMALLEST_PIVOT = 1e-13
+"""Part of the inertia about a degree of freedom that must remain once the joints further out are free; with less it
+moves no mass."""
+
+
+def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) -> int:
+    """The derivative f of the state y = (q, u, z): positions, speeds, auxiliary states. All else stays in `w`.
+
+    Returns:
+        OK or what went wrong; with SINGULAR_MASS, f[0] is the degree of freedom that moves no mass.
+    """
+    place(s, x, w, y, f)
+    if stage == STAGE.POSITION:
+        return OUTCOME.OK
+    status = move(s, x, w, y, f)
+    if status != OUTCOME.OK or stage == STAGE.VELOCITY:
+        return status
+    right = at(f, s[MODEL.DOFS])
+    if stage == STAGE.FORCE or s[MODEL.CHAIN] > 0:
+        clear_wrenches(s, w)
+        status = apply_forces(s, x, w, y, f)
+        generalized_forces(s, w, right)
+        if stage == STAGE.ACCELERATION and status == OUTCOME.OK:
+            status = call(s[MODEL.LAWS + s[s[MODEL.CHAIN] + CHAIN.DYNAMICS]], s, x, w, y, f, 0)
+    else:
+        spatial_inertias_and_bias(s, x, w)
+        status = apply_forces(s, x, w, y, f)
+        composite_rigid_body(s, w, right)
+    if stage == STAGE.FORCE or status != OUTCOME.OK:
+        return status
+    if s[MODEL.CONSTRAINED] > 0:
+        return call(s[MODEL.LAWS + s[s[MODEL.CONSTRAINED] + CONSTRAINED.DYNAMICS]], s, x, w, y, f, 0)
+    singular = solve(s, w, right)
+    if singular >= 0:
+        f[0] = singular
+        return OUTCOME.SINGULAR_MASS
+    return OUTCOME.OK
+
+
+def inverse(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> int:
+    """The generalized forces that are missing for accelerations, constraints left aside.
+
+    Args:
+        s: the mechanism.
+        x: its numbers.
+        w: room.
+        y: the state.
+        f: udot behind the place of the rates; the forces (N, N m) take its place.
+        unused: any number.
+
+    Returns:
+        OK or what went wrong, as of `evaluate`.
+    """
+    place(s, x, w, y, f)
+    status = move(s, x, w, y, f)
+    if status != OUTCOME.OK:
+        return status
+    right = at(f, s[MODEL.DOFS])
+    accelerate(s, w, right)
+    spatial_inertias_and_bias(s, x, w)
+    status = apply_forces(s, x, w, y, f)
+    generalized_forces(s, w, right)
+    for freedom in range(s[MODEL.DOFS]):
+        right[freedom] = -right[freedom]
+    return status
+
+
+def equilibrate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) -> int:
+    """Bring what can be into equilibrium: changes auxiliary states in y, also after one has failed.
+
+    Returns:
+        OK, or what went wrong; with UNSOLVED, f[0] is the number of the first that has no equilibrium.
+    """
+    status = call(s[MODEL.LAWS], s, x, w, y, f, stage)
+    if status != OUTCOME.OK:
+        return status
+    for k in range(s[MODEL.EQUILIBRIA] - 1, -1, -1):
+        j = at(s, s[MODEL.EQUILIBRIUM_AT] + EQUILIBRIUM_INTS * k)
+        if call(j[0], s, x, w, y, f, j[1]) != OUTCOME.OK:
+            status, f[0] = OUTCOME.UNSOLVED, k
+    return status
+
+
+def spun(moments: Floats, a: Vector) -> Vector:
+    """A symmetric matrix times a vector."""
+    x, y, z = a
+    xx, yy, zz, xy, xz, yz = moments[0], moments[1], moments[2], moments[3], moments[4], moments[5]
+    return xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z
+
+
+def momentum(i: Floats, spin: Vector, velocity: Vector) -> tuple[Vector, Vector]:
+    """Inertia times a spatial vector."""
+    first = vector(i, 1)
+    return (
+        plus(spun(at(i, 4), spin), cross(first, velocity)),
+        plus(times(i[0], velocity), cross(spin, first)),
+    )
+
+
+def spatial_inertias_and_bias(s: Ints, x: Floats, w: Floats) -> None:
+    """Inertias of the links, and the wrenches that are missing for their accelerations without udot."""
+    for link in range(s[MODEL.LINKS]):
+        b, here = at(x, INERTIA_AT + 10 * link), link_work(s, w, link)
+        r, i, m = at(here, LINK_WORK.ROTATION), at(here, LINK_WORK.INERTIA), b[0]
+        center = plus(minus(vector(here, LINK_WORK.POSITION), vector(here, LINK_WORK.ORIGIN)), turned(r, vector(b, 1)))
+        cx, cy, cz = center
+        mx, my, mz = times(m, center)
+        one, two, three = vector(r, 0), vector(r, 3), vector(r, 6)
+        # Rows of R I.
+        first, second, third = spun(at(b, 4), one), spun(at(b, 4), two), spun(at(b, 4), three)
+        i[0], i[1], i[2], i[3] = m, mx, my, mz
+        i[4] = dot(first, one) + my * cy + mz * cz
+        i[5] = dot(second, two) + mx * cx + mz * cz
+        i[6] = dot(third, three) + mx * cx + my * cy
+        i[7] = dot(first, two) - mx * cy
+        i[8] = dot(first, three) - mx * cz
+        i[9] = dot(second, three) - my * cz
+        spin, velocity = vector(here, LINK_WORK.VELOCITY), vector(here, LINK_WORK.VELOCITY + 3)
+        angular, linear = momentum(i, spin, velocity)
+        torque, force = momentum(i, vector(here, LINK_WORK.ACCELERATION), vector(here, LINK_WORK.ACCELERATION + 3))
+        torque = plus(torque, plus(cross(spin, angular), cross(velocity, linear)))
+        put(here, LINK_WORK.WRENCH, times(-1.0, torque))
+        put(here, LINK_WORK.WRENCH + 3, times(-1.0, plus(force, cross(spin, linear))))
+
+
+def accelerate(s: Ints, w: Floats, udot: Floats) -> None:
+    """Add what udot gives to the accelerations of the links, outwards from ground."""
+    columns = at(w, s[MODEL.WORK_COLUMN])
+    for link in range(s[MODEL.LINKS]):
+        j, here = link_ints(s, link), link_work(s, w, link)
+        # The wrench is not needed yet; its place has what the links before add.
+        turn, shift = ZERO, ZERO
+        if j[LINK.PARENT] >= 0:
+            above = at(link_work(s, w, j[LINK.PARENT]), LINK_WORK.WRENCH)
+            turn, shift = vector(above, 0), vector(above, 3)
+        for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
+            c = at(columns, 6 * freedom)
+            turn, shift = along(turn, udot[freedom], vector(c, 0)), along(shift, udot[freedom], vector(c, 3))
+        put(here, LINK_WORK.WRENCH, turn)
+        put(here, LINK_WORK.WRENCH + 3, shift)
+        put(here, LINK_WORK.ACCELERATION, plus(vector(here, LINK_WORK.ACCELERATION), turn))
+        put(here, LINK_WORK.ACCELERATION + 3, plus(vector(here, LINK_WORK.ACCELERATION + 3), shift))
+
+
+def clear_wrenches(s: Ints, w: Floats) -> None:
+    """No wrench on any link."""
+    for link in range(s[MODEL.LINKS]):
+        load = at(link_work(s, w, link), LINK_WORK.WRENCH)
+        for k in range(6):
+            load[k] = 0.0
+
+
+def apply_forces(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
+    """Add what all items push to the wrenches, or to the generalized forces behind the rates in f.
+
+    Returns:
+        OK, or what the kernel of an item says; then f[0] is the number of the item.
+    """
+    for number in range(s[MODEL.DOFS], s[MODEL.STATE_SIZE]):
+        f[number] = 0.0
+    for number in range(s[MODEL.CONTACTS]):
+        result = at(w, s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * number)
+        result[0], result[1], result[2], result[CONTACT_WORK.DEPTH] = 0.0, 0.0, 0.0, 0.0
+    for number in range(s[MODEL.RUNS]):
+        run = s[MODEL.RUN_AT] + RUN.SIZE * number
+        if s[run + RUN.LAW] != 0:
+            status = call(s[run + RUN.LAW], s, x, w, y, f, run)
+            if status != OUTCOME.OK:
+                return status
+            continue
+        for k in range(s[run + RUN.FIRST], s[run + RUN.END]):
+            item = s[s[MODEL.ITEM_AT] + k]
+            status = call(s[item + ITEM.LAW], s, x, w, y, f, item)
+            if status != OUTCOME.OK:
+                f[0] = k
+                return status
+    return OUTCOME.OK
+
+
+def generalized_forces(s: Ints, w: Floats, right: Floats) -> None:
+    """The generalized forces of the wrenches, inwards from the leaves."""
+    columns = at(w, s[MODEL.WORK_COLUMN])
+    for link in range(s[MODEL.LINKS] - 1, -1, -1):
+        j, load = (
+            link_ints(s, link),
+            at(link_work(s, w, link), LINK_WORK.WRENCH),
+        )
+        for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
+            c = at(columns, 6 * freedom)
+            for k in range(6):
+                right[freedom] += c[k] * load[k]
+        if j[LINK.PARENT] >= 0:
+            above = at(link_work(s, w, j[LINK.PARENT]), LINK_WORK.WRENCH)
+            for k in range(6):
+                above[k] += load[k]
+
+
+def composite_rigid_body(s: Ints, w: Floats, right: Floats) -> None:
+    """Mass matrix, and the generalized forces, inwards from the leaves."""
+    freedoms, columns = at(s, s[MODEL.DOF_AT]), at(w, s[MODEL.WORK_COLUMN])
+    for link in range(s[MODEL.LINKS] - 1, -1, -1):
+        j, here = link_ints(s, link), link_work(s, w, link)
+        i, load = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH)
+        for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
+            c = at(columns, 6 * freedom)
+            turn, shift = vector(c, 0), vector(c, 3)
+            right[freedom] += dot(turn, vector(load, 0)) + dot(shift, vector(load, 3))
+            angular, linear = momentum(i, turn, shift)
+            row, k, place = at(w, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
+            while k >= 0:
+                c = at(columns, 6 * k)
+                row[place] = dot(vector(c, 0), angular) + dot(vector(c, 3), linear)
+                k = freedoms[DOF.SIZE * k + DOF.ABOVE]
+                place += 1
+        if j[LINK.PARENT] >= 0:
+            above = at(link_work(s, w, j[LINK.PARENT]), LINK_WORK.INERTIA)
+            # The wrench stands behind the inertia.
+            for k in range(16):
+                above[k] += i[k]
+
+
+def solve(s: Ints, w: Floats, right: Floats) -> int:
+    """Solve for the accelerations in place; returns the degree of freedom that moves no mass, or -1."""
+    size, freedoms, pivots = s[MODEL.DOFS], at(s, s[MODEL.DOF_AT]), at(w, s[MODEL.WORK_PIVOT])
+    for k in range(size):
+        pivots[k] = w[freedoms[DOF.SIZE * k + DOF.ROW]]
+    for k in range(size - 1, -1, -1):
+        j = at(freedoms, DOF.SIZE * k)
+        row, depth, i = at(w, j[DOF.ROW]), j[DOF.DEPTH], j[DOF.ABOVE]
+        pivot = row[0]
+        if not pivot > SMALLEST_PIVOT * pivots[k]:
+            return k
+        inverse, load = 1.0 / pivot, right[k]
+        for m in range(1, depth + 1):
+            a = row[m] * inverse
+            target = at(w, freedoms[DOF.SIZE * i + DOF.ROW])
+            for t in range(depth + 1 - m):
+                target[t] -= a * row[m + t]
+            right[i] -= a * load
+            row[m] = a
+            i = freedoms[DOF.SIZE * i + DOF.ABOVE]
+        right[k] = load * inverse
+    for k in range(size):
+        j = at(freedoms, DOF.SIZE * k)
+        row, i, total = at(w, j[DOF.ROW]), j[DOF.ABOVE], right[k]
+        for m in range(1, j[DOF.DEPTH] + 1):
+            total -= row[m] * right[i]
+            i = freedoms[DOF.SIZE * i + DOF.ABOVE]
+        right[k] = total
+    return -1

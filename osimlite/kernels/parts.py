@@ -1,0 +1,26 @@
+"""The records of a link and of an operation: their integers in s, and what an evaluation leaves of them in w."""
+
+from __future__ import annotations
+
+from osimlite.kernels.layout import LINK, LINK_WORK, MODEL, OPERATION, OPERATION_WORK
+from osimlite.kernels.pointers import Floats, Ints, at
+
+
+def link_ints(s: Ints, link: int) -> Ints:
+    """Integers of a link, see `LINK`."""
+    return at(s, s[MODEL.LINK_AT] + LINK.SIZE * link)
+
+
+def link_work(s: Ints, w: Floats, link: int) -> Floats:
+    """Work of a link, see `LINK_WORK`."""
+    return at(w, s[MODEL.WORK_LINK] + LINK_WORK.SIZE * link)
+
+
+def operation_ints(s: Ints, operation: int) -> Ints:
+    """Integers of an operation, see `OPERATION`."""
+    return at(s, s[MODEL.OPERATION_AT] + OPERATION.SIZE * operation)
+
+
+def operation_work(s: Ints, w: Floats, operation: int) -> Floats:
+    """Work of an operation, see `OPERATION_WORK`."""
+    return at(w, s[MODEL.WORK_OPERATION] + OPERATION_WORK.SIZE * operation)

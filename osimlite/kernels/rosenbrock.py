@@ -1,0 +1,130 @@
+"""A Rosenbrock method of order 3, for stiff motion at loose tolerances.
+
+ROS34PW2 (J. Rang, L. Angermann, New Rosenbrock W-methods of order 3 for partial differential algebraic equations of
+index 1, BIT 45, 2005): four linear systems a step instead of an iteration. It is L-stable and stiffly accurate, and
+keeps its order whatever the derivatives J are, so that those of :mod:`osimlite.kernels.condensation` do.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from osimlite.kernels.condensation import condense, correct, linearise
+from osimlite.kernels.error_control import step_error
+from osimlite.kernels.layout import MODEL, OUTCOME, STAGE, WORK
+from osimlite.kernels.method import (
+    ACCEPTED,
+    ERRORS,
+    EVALUATED,
+    HAS_DERIVATIVE,
+    LAST_TIME,
+    MEMORY,
+    NEXT_STEP,
+    REACHED,
+)
+from osimlite.kernels.pointers import Floats, Ints, at, call
+from osimlite.kernels.states import copy, is_finite
+
+IS_NEW = MEMORY
+"""Whether the derivatives are those at the start of the step."""
+HEAD, IS_IMPLICIT = MEMORY + 1, True
+
+STAGES = 4
+STATES = STAGES
+"""The method keeps a derivative for each stage: so many vectors as long as a state."""
+
+DIAGONAL = 4.3586652150845900e-01
+ALPHA = (
+    (0.0, 0.0, 0.0, 0.0),
+    (8.7173304301691801e-01, 0.0, 0.0, 0.0),
+    (8.4457060015369423e-01, -1.1299064236484185e-01, 0.0, 0.0),
+    (0.0, 0.0, 1.0, 0.0),
+)
+GAMMA = (
+    (DIAGONAL, 0.0, 0.0, 0.0),
+    (-8.7173304301691801e-01, DIAGONAL, 0.0, 0.0),
+    (-9.0338057013044082e-01, 5.4180672388095326e-02, DIAGONAL, 0.0),
+    (2.4212380706095346e-01, -1.2232505839045147, 5.4526025533510214e-01, DIAGONAL),
+)
+WEIGHTS = (2.4212380706095346e-01, -1.2232505839045147, 1.5452602553351020, DIAGONAL)
+EMBEDDED = (3.7810903145819369e-01, -9.6042292212423178e-02, 0.5, 2.1793326075422950e-01)
+
+
+def _by_gamma(row: tuple[float, ...]) -> tuple[float, ...]:
+    """A row times the inverse of GAMMA."""
+    result = [0.0] * STAGES
+    for j in range(STAGES - 1, -1, -1):
+        rest = sum(result[i] * GAMMA[i][j] for i in range(j + 1, STAGES))
+        result[j] = (row[j] - rest) / DIAGONAL
+    return tuple(result)
+
+
+UNIT = tuple(tuple(float(i == j) for j in range(STAGES)) for i in range(STAGES))
+PLACES = tuple(value for row in ALPHA for value in _by_gamma(row))
+CARRIED = tuple(-DIAGONAL * value for row in UNIT for value in _by_gamma(row))
+ENDS = _by_gamma(WEIGHTS)
+MISSES = _by_gamma(tuple(one - other for one, other in zip(WEIGHTS, EMBEDDED, strict=True)))
+TIMES = tuple(sum(row) for row in ALPHA)
+"""The coefficients as the stages need them, in which no product with J occurs (E. Hairer, G. Wanner, Solving Ordinary
+Differential Equations II, chapter IV.7): by rows where a stage is evaluated, and what it has of those before it; what
+end and error have of the stages; times."""
+
+SAFETY, SHRINK, GROW, WORTH = 0.9, 0.2, 5.0, 1.1
+"""Of the step that should just do, which is taken; how much a step changes at most, and at least to be made longer."""
+
+
+def rosenbrock(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> int:
+    """Try one step from y0, behind which its derivative stands, to y1."""
+    size = s[MODEL.STATE_SIZE]
+    h = at(w, place)
+    stages, room = at(h, HEAD), at(h, HEAD + STATES * size)
+    errors, f1 = at(w, s[MODEL.WORK_STATE] + ERRORS * size), at(y1, size)
+    t0, accuracy, step = h[REACHED], h[ACCEPTED], h[NEXT_STEP]
+    h[EVALUATED], h[HAS_DERIVATIVE] = STAGES - 1.0, 0.0
+    t1 = h[LAST_TIME] if h[LAST_TIME] <= t0 + 1.001 * step else t0 + step
+    cut = t1 - t0 < 0.95 * step
+    step = t1 - t0
+    c, error = DIAGONAL * step, inf
+    if h[IS_NEW] == 0.0:
+        w[WORK.TIME] = t0
+        copy(size, y0, y1)
+        h[IS_NEW] = 1.0 if linearise(s, x, w, y1, f1, room) == OUTCOME.OK else 0.0
+    if h[IS_NEW] > 0.0 and condense(s, c, room) and staged(s, x, w, t0, step, c, y0, y1, stages, room):
+        for k in range(size):
+            y1[k], errors[k] = y0[k], 0.0
+            for i in range(STAGES):
+                y1[k] += ENDS[i] * stages[size * i + k]
+                errors[k] += MISSES[i] * stages[size * i + k]
+        error = step_error(s, x, w, t1, y0, y1, errors, h, 1)
+    factor = SAFETY * (accuracy / max(error, 1e-9 * accuracy)) ** (1.0 / 3.0)
+    if not error <= accuracy:
+        # Near the resolution of the time, the step was longer than it was to be.
+        h[NEXT_STEP] = min(max(factor, SHRINK) * step, SAFETY * h[NEXT_STEP])
+        return OUTCOME.OK
+    h[REACHED], h[IS_NEW] = t1, 0.0
+    if factor < 1.0 or (factor >= WORTH and not cut):
+        h[NEXT_STEP] = min(factor, GROW) * step
+    return OUTCOME.OK
+
+
+def staged(
+    s: Ints, x: Floats, w: Floats, t0: float, step: float, c: float, y0: Floats, y: Floats, stages: Floats, room: Floats
+) -> bool:
+    """Compute the stages; y has room for a state and its derivative."""
+    size, f = s[MODEL.STATE_SIZE], at(y, s[MODEL.STATE_SIZE])
+    for i in range(STAGES):
+        stage, rates = at(stages, size * i), f if i > 0 else at(y0, size)
+        if i > 0:
+            for k in range(size):
+                y[k] = y0[k]
+                for j in range(i):
+                    y[k] += PLACES[STAGES * i + j] * stages[size * j + k]
+            w[WORK.TIME] = t0 + TIMES[i] * step
+            if call(s[MODEL.LAWS], s, x, w, y, f, STAGE.ACCELERATION) != OUTCOME.OK or not is_finite(size, f):
+                return False
+        for k in range(size):
+            stage[k] = c * rates[k]
+            for j in range(i):
+                stage[k] += CARRIED[STAGES * i + j] * stages[size * j + k]
+        correct(s, c, room, stage)
+    return True

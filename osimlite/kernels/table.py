@@ -1,0 +1,87 @@
+"""Which functions are compiled by themselves and called by their address, by name.
+
+Each is compiled when the first model that needs it is made ready, and kept. Those of the engine are here; those that
+are written for kinds of forces and probes are in :mod:`osimlite.simulation.elements.laws`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+LAW_MODULES = {
+    "evaluate": "dynamics",
+    "equilibrate": "dynamics",
+    "run_several": "runs",
+    "hold_several": "walks",
+    "walk_several": "walks",
+    "merson": "merson",
+    "euler2": "euler2",
+    "adams": "multistep",
+    "bdf": "multistep",
+    "rosenbrock": "rosenbrock",
+    "fit_frames": "pose_fit",
+    "set_controls": "controls",
+    "contact_places": "places",
+    "place_ball": "ball_joint",
+    "move_ball": "ball_joint",
+    "place_drift": "acceleration_error",
+    "move_drift": "acceleration_error",
+    "constrained_dynamics": "constrained_dynamics",
+    "chain_dynamics": "chain",
+    "project": "projection",
+    "factorise_law": "least_squares",
+    "minimum_norm_law": "least_squares",
+    "prescribe": "constraint_equations",
+    "couple": "constraint_equations",
+    "bind_bodies": "constraint_equations",
+    "amount_by_one": "functions",
+    "amount_by_several": "functions",
+    "amount_by_arc": "constant_curvature",
+    "touch_half_space": "contacts",
+    "touch_spheres": "contacts",
+    "contact_response": "contacts",
+    "touch_ellipsoid": "rare_contacts",
+    "touch_ellipsoids": "rare_contacts",
+    "early_return": "rare_contacts",
+    "touch_mesh": "meshes",
+    "function_path": "function_paths",
+    "pull_coordinates": "function_paths",
+    "function_of_one": "function_paths",
+    "polynomial": "function_paths",
+    "formula": "function_paths",
+    "cable_path": "cable_paths",
+    "pull_cable": "cable_paths",
+    "wrap_cylinder": "wrap_cylinder",
+    "wrap_sphere": "wrap_sphere",
+    "wrap_ellipsoid": "wrap_ellipsoid",
+    "wrap_torus": "wrap_torus",
+    "trace_path": "wrap_curves",
+    "trace_geodesics": "geodesic_curves",
+    "trace_cable": "geodesic_curves",
+    "trace_cylinder": "wrap_curves",
+    "trace_sphere": "wrap_curves",
+    "trace_ellipsoid": "wrap_curves",
+    "trace_torus": "wrap_curves",
+    "straight_path": "paths",
+    "pull_points": "paths",
+    "pull_each": "paths",
+    "watch": "poses",
+    "look": "poses",
+    "push_each": "poses",
+    "least_effort": "effort",
+    "wrapped_path": "path_wraps",
+    "geodesic_path": "geodesic_paths",
+    "inverse": "dynamics",
+}
+"""The module of each of the engine's own."""
+
+LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
+"""Index of a law's address among those that begin at `layout.LAWS`."""
+
+
+def own_function(name: str) -> Callable[..., Any]:
+    """The function of a name."""
+    function: Callable[..., Any] = getattr(import_module(f"{__package__}.{LAW_MODULES[name]}"), name)
+    return function

@@ -1,0 +1,111 @@
+"""The joints of another program, packed: what each of them follows."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from osimlite.kernels.layout import CHAIN, DOF, JOINT, JOINT_KIND, MODEL, MOTION
+from osimlite.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
+from osimlite.multibody.parts import GROUND
+from osimlite.robot.lines import as_line
+from osimlite.robot.robot import RobotJoint
+
+if TYPE_CHECKING:
+    from osimlite.simulation.pack import Packer
+
+
+class Chain(NamedTuple):
+    """A robot whose mass matrix and bias another program computes."""
+
+    joints: Sequence[RobotJoint]  # that move, in the order of that program
+    # body, and what its principal moments of inertia are larger by there than in the model (kg·m²)
+    excess: Sequence[tuple[int, float]]
+    # kernel in Python. In the work vector it finds values, rates and accelerations of the joints, and writes the
+    # forces behind them that these accelerations take against gravity, and the mass matrix.
+    supply: Callable[..., None]
+
+
+def pack_chain(packer: Packer, chain: Chain) -> None:
+    """Write what the kernels need to know of a chain, if it has any joints."""
+    ints, count = packer.ints, len(chain.joints)
+    if not count:
+        return
+    start = ints[MODEL.CHAIN] = len(ints)
+    head = [0] * CHAIN.SIZE
+    ints += head
+    packer.kernels[start + CHAIN.SUPPLY] = chain.supply
+    head[CHAIN.DYNAMICS], head[CHAIN.JOINTS] = packer.law("chain_dynamics"), count
+    records: list[int] = []
+    shares: list[tuple[int, int]] = []
+    for number, joint in enumerate(chain.joints):
+        kind, source, part, freedoms = _followed(packer, joint)
+        records += [kind, source, part, len(shares)]
+        shares += [(number, freedom) for freedom in freedoms]
+    lists = {
+        (CHAIN.JOINTS, CHAIN.JOINT_AT): (JOINT.SIZE, records),
+        (CHAIN.SHARES, CHAIN.SHARE_AT): (2, [item for share in shares for item in share]),
+        (CHAIN.PRODUCTS, CHAIN.PRODUCT_AT): (4, _products(packer, shares, count)),
+        (CHAIN.EXCESSES, CHAIN.EXCESS_AT): (3, _excesses(packer, chain.excess)),
+    }
+    for (length, place), (each, numbers) in lists.items():
+        head[length], head[place] = len(numbers) // each, len(ints)
+        ints += numbers
+    head[CHAIN.WORK_JOINTS], head[CHAIN.WORK_SHARES] = packer.room((4 + count) * count), packer.room(len(shares))
+    head[CHAIN.ENTRY_AT] = ints[ints[MODEL.DOF_AT] + DOF.ROW]
+    head[CHAIN.END_ENTRY] = head[CHAIN.ENTRY_AT] + packer.entries
+    ints[start : start + CHAIN.SIZE] = head
+
+
+def _followed(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, list[int]]:
+    """Kind, source and part of a joint, and the degrees of freedom that move it."""
+    function, places = joint.function, list(joint.coordinates)
+    freedoms = [packer.places.freedom(place) for place in places]
+    for number, operation in enumerate(packer.operations):
+        if operation.joint != joint.source:
+            continue
+        is_ball = operation.kind in (MOTION.BALL, MOTION.BALL_BACK)
+        if operation.kind == MOTION.ACCELERATION_ERROR and isinstance(function, AccelerationErrorAngle):
+            return JOINT_KIND.ERROR, number, function.component, []
+        if is_ball and isinstance(function, EllipsoidPoint):
+            return JOINT_KIND.ELLIPSOID, number, function.component, freedoms
+        if is_ball and len(places) == 1 and places[0] in operation.arguments:
+            angles = [packer.places.freedom(place) for place in operation.arguments]
+            return JOINT_KIND.ANGLE, number, operation.arguments.index(places[0]), angles
+        if operation.function is function and operation.arguments == places:
+            return JOINT_KIND.AMOUNT_OF, number, 0, freedoms
+    line = as_line(function)
+    assert line is not None and line.start == 0.0, f"nothing moves '{joint.name}'"
+    packer.numbers.append(line.slope)
+    return JOINT_KIND.LINE, freedoms[0], len(packer.numbers) - 1, freedoms
+
+
+def _products(packer: Packer, shares: Sequence[tuple[int, int]], count: int) -> list[int]:
+    """Of each entry of our mass matrix the pairs of shares, the entry of the other one, and the place of the sum."""
+    of_freedom: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    for number, (joint, freedom) in enumerate(shares):
+        of_freedom[freedom].append((number, joint))
+    result: list[int] = []
+    freedoms = packer.ints[packer.ints[MODEL.DOF_AT] :]
+    for freedom in range(packer.ints[MODEL.DOFS]):
+        place, other = freedoms[DOF.SIZE * freedom + DOF.ROW], freedom
+        while other >= 0:
+            for one, i in of_freedom[freedom]:
+                for two, j in of_freedom[other]:
+                    result += one, two, count * i + j, place
+            place, other = place + 1, freedoms[DOF.SIZE * other + DOF.ABOVE]
+    return result
+
+
+def _excesses(packer: Packer, excess: Sequence[tuple[int, float]]) -> list[int]:
+    """Link, last degree of freedom on the way to it, and place of the number."""
+    result: list[int] = []
+    for body, moment in excess:
+        link = carrier = packer.places.placements[body].link
+        while carrier != GROUND and packer.ends[carrier] == packer.ends[carrier + 1]:
+            carrier = packer.links[carrier].parent
+        if carrier != GROUND:
+            result += link, packer.ends[carrier + 1] - 1, len(packer.numbers)
+            packer.numbers.append(moment)
+    return result
