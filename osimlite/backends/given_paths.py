@@ -19,12 +19,13 @@ from osimlite.backends.symbols import casadi
 from osimlite.kernels.function_paths import ARMS, DERIVATIVES
 from osimlite.kernels.layout import ITEM, MODEL, OUTCOME
 from osimlite.kernels.paths import LENGTH, SPEED
+from osimlite.multibody.links import Places
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.records import replace
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.geometries.path import PATH
-from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.elements.items import Item
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.path_system import MeasuredPath, PathSystem
 

@@ -12,12 +12,12 @@ from osimlite.kernels.layout import INERTIA_AT, LINK, LINK_WORK, MODEL
 from osimlite.kernels.parts import link_ints
 from osimlite.kernels.paths import LENGTH, SPEED
 from osimlite.kernels.points import angular_velocity, direction, station, velocity
+from osimlite.multibody.links import Places
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.sphere_on_plane import SPHERE_ON_PLANE
-from osimlite.simulation.elements.items import Places
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.pack import Packed

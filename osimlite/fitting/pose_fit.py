@@ -14,12 +14,12 @@ from osimlite.kernels.pointers import Floats, Ints
 from osimlite.kernels.pose_fit import APART, STUCK, UNSEEN
 from osimlite.multibody.constraints import Lock, Prescribed
 from osimlite.multibody.functions import Function
+from osimlite.multibody.links import Places
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.records import replace
 from osimlite.simulation.constrained import free_coordinates
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.elements.items import Places
 from osimlite.simulation.engines.linking import Code
 from osimlite.simulation.system import System
 

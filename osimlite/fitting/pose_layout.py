@@ -13,9 +13,9 @@ from osimlite.kernels.pointers import Floats, Ints
 from osimlite.kernels.pose_fit import POSES
 from osimlite.multibody.constraints import Constraint, Coupler
 from osimlite.multibody.function_tables import function_table
+from osimlite.multibody.links import Places
 from osimlite.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
 from osimlite.records import dataclass
-from osimlite.simulation.elements.items import Places
 from osimlite.simulation.system import System
 
 SCAN = 2001

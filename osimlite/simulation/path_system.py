@@ -13,11 +13,12 @@ from osimlite.errors import SimulationError
 from osimlite.kernels.layout import OUTCOME, STAGE
 from osimlite.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SURFACE
 from osimlite.kernels.wrapping import SURFACE_LENGTH
+from osimlite.multibody.links import Places
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass, replace
 from osimlite.simulation.elements.geometries.path import Path as Along
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
-from osimlite.simulation.elements.items import Item, Places, Silent
+from osimlite.simulation.elements.items import Item, Silent
 from osimlite.simulation.states import StateVariable
 from osimlite.simulation.system import System
 

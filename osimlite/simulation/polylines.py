@@ -10,9 +10,10 @@ import numpy as np
 
 from osimlite.kernels.layout import ITEM, LINK_WORK, MODEL
 from osimlite.kernels.pointers import Ints
+from osimlite.multibody.links import Placement, Places
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
-from osimlite.simulation.elements.items import Item, Placement, Places
+from osimlite.simulation.elements.items import Item
 from osimlite.simulation.engines.linking import Code, best
 
 

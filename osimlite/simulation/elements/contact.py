@@ -11,6 +11,7 @@ from osimlite.errors import ModelError, UnsupportedError
 from osimlite.forces.hunt_crossley import combine_materials, contact_energy
 from osimlite.forces.vectors import cross, minus, plus, vector
 from osimlite.kernels.layout import CONTACT_WORK, ITEM
+from osimlite.multibody.links import Places
 from osimlite.multibody.spatial import Array, offset
 from osimlite.records import dataclass
 from osimlite.schema.contact import ContactEllipsoid, ContactGeometry, ContactHalfSpace, ContactSphere
@@ -18,7 +19,7 @@ from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.tree import Use
 from osimlite.simulation.elements.gather import ElementBuilder, Triple, kind_of, triple
-from osimlite.simulation.elements.items import Item, Places, Response
+from osimlite.simulation.elements.items import Item, Response
 from osimlite.simulation.states import StateVariable
 
 if TYPE_CHECKING:

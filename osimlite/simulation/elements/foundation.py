@@ -19,6 +19,7 @@ from osimlite.kernels.layout import ITEM, LINK_WORK, MODEL
 from osimlite.kernels.meshes import MESH_WORK, load_mesh
 from osimlite.kernels.pointers import Floats, Ints
 from osimlite.kernels.points import angular_velocity, station, velocity
+from osimlite.multibody.links import Placement, Places
 from osimlite.multibody.spatial import Array, transform
 from osimlite.records import dataclass
 from osimlite.schema.contact import ContactMesh
@@ -33,7 +34,7 @@ from osimlite.simulation.elements.contact import (
     surface_of,
 )
 from osimlite.simulation.elements.gather import ElementBuilder, triple
-from osimlite.simulation.elements.items import Item, Placement, Places
+from osimlite.simulation.elements.items import Item
 from osimlite.simulation.elements.triangle_mesh import TriangleMesh
 
 Load = tuple[Vector, Vector, float]

@@ -2,22 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
-import numpy as np
-
-from osimlite.multibody.mechanism import GROUND, Mechanism
-from osimlite.multibody.spatial import Array
+from osimlite.multibody.links import Places
 from osimlite.records import dataclass
 from osimlite.simulation.states import StateVariable
-
-
-class Placement(NamedTuple):
-    """The link that a body belongs to (-1 for ground), and the body's frame (4, 4) in it."""
-
-    link: int
-    frame: Array
 
 
 class Response(NamedTuple):
@@ -101,38 +91,3 @@ class Silent:
     def energy(self, records: Sequence[Sequence[float]]) -> float:
         """None, J."""
         return 0.0
-
-
-@dataclass(frozen=True)
-class Places:
-    """Where coordinates and bodies are."""
-
-    mechanism: Mechanism  # of the model
-    freedoms: Mapping[int, int]  # degree of freedom of each coordinate that is free
-    placements: list[Placement]  # of the bodies
-
-    def freedom(self, coordinate: int) -> int:
-        """Degree of freedom of a coordinate, -1 if it is locked."""
-        return self.freedoms.get(coordinate, -1)
-
-    def locked_value(self, coordinate: int) -> float:
-        """Value that a coordinate has if it is locked."""
-        return float(self.mechanism.coordinates[coordinate].default_value)
-
-    def placement(self, body: int) -> Placement:
-        """Link and frame of a body, or of ground."""
-        return self.placements[body] if body != GROUND else Placement(GROUND, np.eye(4))
-
-    def station(self, body: int, point: Sequence[float]) -> tuple[int, tuple[float, ...]]:
-        """Link of a body, and a point of the body in the link."""
-        link, frame = self.placement(body)
-        return link, tuple((frame[:3, :3] @ np.array(point) + frame[:3, 3]).tolist())
-
-    def direction(self, body: int, vector: Sequence[float]) -> tuple[float, ...]:
-        """A direction of a body in its link."""
-        return tuple((self.placement(body).frame[:3, :3] @ np.array(vector)).tolist())
-
-    def frame(self, body: int, frame: Array) -> tuple[int, list[float]]:
-        """Link of a body, and axes and origin in the link of a frame (4, 4) of the body."""
-        link, of_body = self.placement(body)
-        return link, (of_body @ frame)[:3].T.ravel().tolist()

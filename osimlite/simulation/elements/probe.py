@@ -22,10 +22,11 @@ from osimlite.kernels.layout import ITEM
 from osimlite.kernels.written import written
 from osimlite.multibody.function_tables import table_of_one
 from osimlite.multibody.functions import Function
+from osimlite.multibody.links import Places
 from osimlite.quantity import tell
 from osimlite.records import dataclass
 from osimlite.simulation.elements.gather import ElementBuilder, module_of
-from osimlite.simulation.elements.items import CONTROLS, ForceElement, Item, Places, Silent
+from osimlite.simulation.elements.items import CONTROLS, ForceElement, Item, Silent
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.states import StateVariable
 from osimlite.text import did_you_mean

@@ -12,6 +12,7 @@ from osimlite.kernels.layout import ITEM, MODEL
 from osimlite.kernels.pointers import Floats
 from osimlite.multibody.build import mass_properties
 from osimlite.multibody.constraints import Lock
+from osimlite.multibody.links import Places
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.records import replace
 from osimlite.schema.base import Component
@@ -21,7 +22,7 @@ from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.controls import Controls, ModelControls
-from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.elements.items import Item
 from osimlite.simulation.elements.kind import kind_of_class
 from osimlite.simulation.elements.probe import DeclaredProbe, probe_elements
 from osimlite.simulation.many import Renewed

@@ -11,10 +11,10 @@ from osimlite.errors import ModelError
 from osimlite.forces.vectors import Vector, dot, minus, norm, put, times, turned_back, vector
 from osimlite.kernels.pointers import Floats, Ints, at
 from osimlite.kernels.points import angular_velocity, apply_force, apply_torque, direction, station, velocity
+from osimlite.multibody.links import Places
 from osimlite.multibody.mechanism import GROUND
 from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
-from osimlite.simulation.elements.items import Places
 
 
 def turn_bodies(s: Ints, w: Floats, g: Ints, gp: Floats, torque: float) -> None:

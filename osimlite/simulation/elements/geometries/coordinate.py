@@ -7,10 +7,10 @@ from typing import Any
 
 from osimlite.kernels.layout import MODEL
 from osimlite.kernels.pointers import Floats, Ints
+from osimlite.multibody.links import Places
 from osimlite.records import dataclass
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import Geometry
-from osimlite.simulation.elements.items import Places
 
 
 def coordinate(s: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, float]:

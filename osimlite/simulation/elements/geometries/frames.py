@@ -11,11 +11,11 @@ from osimlite.forces.bushing import xyz_angles, xyz_moment, xyz_rates
 from osimlite.forces.vectors import minus, put, times, turned, turned_back, vector
 from osimlite.kernels.pointers import Floats, Ints, at
 from osimlite.kernels.points import angular_velocity, apply_force, apply_torque, direction, station, velocity
+from osimlite.multibody.links import Places
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import Geometry
-from osimlite.simulation.elements.items import Places
 
 DEVIATIONS, LOADS, RATES, AXES, ROOM = 12, 18, 24, 30, 48
 """Places in the record, after force and moment on the second frame and the origins of both; the axes are of both."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
+from osimlite.multibody.links import Places
 from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.elements.items import Item
 
 
 class Geometry:

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 from osimlite.forces.vectors import dot, minus, norm, put, times, vector
 from osimlite.kernels.pointers import Floats, Ints
 from osimlite.kernels.points import apply_force, station, velocity
+from osimlite.multibody.links import Places
 from osimlite.records import dataclass
 from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
-from osimlite.simulation.elements.items import Places
 
 
 def line(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float]:

@@ -11,9 +11,9 @@ from osimlite.kernels.pointers import Floats, Ints, at
 from osimlite.kernels.points import apply_force, apply_torque, direction, station
 from osimlite.multibody.function_tables import table_of_one
 from osimlite.multibody.functions import Function
+from osimlite.multibody.links import Places
 from osimlite.multibody.mechanism import FramePlacement
 from osimlite.simulation.elements.geometries.geometry import Geometry
-from osimlite.simulation.elements.items import Places
 
 FRAME = 12
 """Numbers of a frame: rotation by columns and origin in its link."""

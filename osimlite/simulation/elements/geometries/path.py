@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 from osimlite.kernels.paths import path_length, pull_path
+from osimlite.multibody.links import Places
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of, module_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
-from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.elements.items import Item
 
 
 class Path(Protocol):

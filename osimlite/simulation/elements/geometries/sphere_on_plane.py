@@ -11,11 +11,11 @@ from osimlite.errors import ModelError
 from osimlite.forces.vectors import Vector, along, dot, minus, put, times, vector
 from osimlite.kernels.pointers import Floats, Ints
 from osimlite.kernels.points import apply_force, direction, station, velocity
+from osimlite.multibody.links import Places
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
 from osimlite.simulation.elements.contact import ContactSurface, surface_of
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
-from osimlite.simulation.elements.items import Places
 
 NO_MATERIAL = (0.0, 0.0, 0.0, 0.0, 0.0)
 

@@ -22,13 +22,14 @@ from osimlite.kernels.wrap_curves import MOST
 from osimlite.kernels.wrapping import AXIAL, HYBRID, MIDPOINT
 from osimlite.multibody.function_tables import table_of_one
 from osimlite.multibody.functions import Function
+from osimlite.multibody.links import Places
 from osimlite.multibody.spatial import Array, offset
 from osimlite.records import dataclass, replace
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.paths import AbstractPathPoint, ConditionalPathPoint, MovingPathPoint, PathPoint
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere, WrapTorus
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of
-from osimlite.simulation.elements.items import Item, Places
+from osimlite.simulation.elements.items import Item
 
 TOLERANCE = 1e-5
 """A conditional point counts so far outside its range, in OpenSim."""

@@ -31,13 +31,14 @@ from osimlite.kernels.cable_surfaces import CYLINDER, ELLIPSOID, END, POINT, SPH
 from osimlite.kernels.layout import ITEM
 from osimlite.kernels.paths import LENGTH
 from osimlite.kernels.wrap_curves import MOST
+from osimlite.multibody.links import Placement, Places
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.spatial import Array, offset
 from osimlite.records import dataclass, replace
 from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactGeometry, ContactSphere, ContactTorus
 from osimlite.schema.scholz_paths import Scholz2015GeometryPathPoint
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of
-from osimlite.simulation.elements.items import Item, Placement, Places
+from osimlite.simulation.elements.items import Item
 
 FIRST_STEP = 1e-10
 """Of the first integration of a geodesic, m."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,10 +15,11 @@ from osimlite.kernels.least_squares import factor_room
 from osimlite.multibody import body_constraints as b
 from osimlite.multibody.constraints import Constraint, Coupler, Prescribed
 from osimlite.multibody.function_tables import function_table, table_of_one
-from osimlite.multibody.mechanism import FramePlacement, StationPlacement
-from osimlite.multibody.parts import GROUND
+from osimlite.multibody.parts import GROUND, FramePlacement, StationPlacement
 from osimlite.multibody.spatial import Array
-from osimlite.simulation.elements.items import Places
+
+if TYPE_CHECKING:
+    from osimlite.multibody.links import Places
 
 Balls = Mapping[tuple[int, ...], int]
 """By the degrees of freedom of a ball, where the place of its arguments is."""
