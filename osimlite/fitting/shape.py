@@ -16,7 +16,6 @@ from osimlite.fitting.scaling import scale_model
 from osimlite.fitting.segments import Segments
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Lock, Prescribed
-from osimlite.multibody.kinematics import kinematics
 from osimlite.multibody.mechanism import Mechanism, StationPlacement
 from osimlite.multibody.spatial import Array
 from osimlite.schema.markers import Marker as ModelMarker
@@ -148,7 +147,7 @@ class _Points:
         ]
         rows = [np.eye(len(q))[[*self._still, *held]]]
         if self._holds:
-            state = kinematics(self._mechanism, q, np.zeros_like(q), bodies=self._mechanism.constrained)
+            state = self._mechanism.at(q)
             rows += [item.velocity_equations(state)[0] for item in self._holds]
         _, lengths, directions = np.linalg.svd(np.vstack(rows))
         return np.asarray(directions[int((lengths > AT_END).sum()) :].T)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from osimlite.errors import SimulationError
 from osimlite.lint.measures import Pose, Value
-from osimlite.multibody.kinematics import kinematics
 from osimlite.multibody.linear import stacked
 from osimlite.multibody.parts import CoordinateInfo
 from osimlite.multibody.spatial import Array
@@ -129,7 +128,7 @@ def tied(paths: Paths, start: Array) -> Array:
     constraints = paths.mechanism.constraints
     if not constraints:
         return np.zeros(len(start), dtype=bool)
-    state = kinematics(paths.mechanism, start, np.zeros(len(start)), bodies=paths.mechanism.constrained)
+    state = paths.mechanism.at(start)
     rows, _ = stacked([item.velocity_equations(state) for item in constraints])
     result: Array = np.abs(rows).max(axis=0) > 0.0
     return result

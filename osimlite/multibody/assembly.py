@@ -18,7 +18,7 @@ import numpy as np
 
 from osimlite.errors import SimulationError
 from osimlite.multibody.constraints import Coupler
-from osimlite.multibody.kinematics import Kinematics, kinematics
+from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.linear import solutions, stacked
 from osimlite.multibody.spatial import Array
 from osimlite.text import listed
@@ -187,7 +187,7 @@ class _Search:
         )
 
     def _state(self, q: Array) -> Kinematics:
-        return kinematics(self.mechanism, q, np.zeros(len(q)), self.time, bodies=self.mechanism.constrained)
+        return Kinematics(self.mechanism, q, np.zeros(len(q)), self.time)
 
     def _rows(self, state: Kinematics) -> Array:
         """Derivatives of the errors by the free coordinates (p, f)."""

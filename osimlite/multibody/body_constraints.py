@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from osimlite.multibody.constraints import Bond, Bonded
-from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.parts import FramePlacement, StationPlacement
 from osimlite.multibody.spatial import Array, cross, skew
 from osimlite.records import dataclass
 
 if TYPE_CHECKING:
+    from osimlite.multibody.kinematics import Kinematics
     from osimlite.multibody.mechanism import Mechanism
 
 

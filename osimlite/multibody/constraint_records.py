@@ -13,8 +13,9 @@ from osimlite.kernels.constraint_equations import ARM, AXIS, DISTANCE, MEETING, 
 from osimlite.kernels.layout import CONSTRAINED
 from osimlite.kernels.least_squares import factor_room
 from osimlite.multibody import body_constraints as b
-from osimlite.multibody.constraints import Constraint, Coupler, Prescribed
+from osimlite.multibody.constraints import Constraint, Coupler, Lock, Prescribed
 from osimlite.multibody.function_tables import function_table, table_of_one
+from osimlite.multibody.functions import Constant
 from osimlite.multibody.parts import GROUND, FramePlacement, StationPlacement
 from osimlite.multibody.spatial import Array
 
@@ -58,6 +59,10 @@ def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> C
         UnsupportedError: there is no law for it, or for its function.
     """
     match constraint:
+        case Lock():
+            # Every value is right, as long as it stays.
+            own = _coordinate(constraint.coordinate, places, balls)
+            return ConstraintRecord("prescribe", own, table_of_one(Constant(0.0), constraint.name), positions=0)
         case Prescribed():
             table = table_of_one(constraint.function, f"the function of '{constraint.name}'")
             return ConstraintRecord("prescribe", _coordinate(constraint.coordinate, places, balls), table)

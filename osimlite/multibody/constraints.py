@@ -6,14 +6,16 @@ Here are those that speak of coordinates; those between bodies are in :mod:`osim
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
 from osimlite.multibody.functions import Function
-from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
+
+if TYPE_CHECKING:
+    from osimlite.multibody.kinematics import Kinematics
 
 
 class Constraint(Protocol):

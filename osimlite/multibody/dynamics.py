@@ -19,7 +19,7 @@ from osimlite.kernels.constrained_dynamics import SAFE_MASS, SLIGHT
 from osimlite.kernels.least_squares import ROUNDING
 from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.linear import shortest, solutions, stacked
-from osimlite.multibody.spatial import Array
+from osimlite.multibody.spatial import Array, skews
 from osimlite.records import dataclass
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class MassCentres:
         rotations, jacobians = state.rotations[:-1], state.jacobians[:-1]
         arms = (rotations @ centres[:, :, None])[:, :, 0]
         turning = jacobians[:, :3]
-        moving = jacobians[:, 3:] - _skews(arms) @ turning
+        moving = jacobians[:, 3:] - skews(arms) @ turning
         return cls(state, masses, rotations @ inertias @ rotations.transpose(0, 2, 1), arms, turning, moving)
 
     def mass_matrix(self) -> Array:
@@ -164,15 +164,6 @@ def require_numbers(mechanism: Mechanism, *arrays: Array) -> None:
             f"the equations of motion of '{mechanism.name}' are not finite; check the coordinate values and speeds, "
             "the applied forces, the masses and inertias of the bodies and the places of the frames"
         )
-
-
-def _skews(vectors: Array) -> Array:
-    """The matrices [v] with [v] a = v × a of many vectors: (b, 3) to (b, 3, 3)."""
-    result = np.zeros((len(vectors), 3, 3))
-    for row, column, place, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):
-        result[:, row, column] = sign * vectors[:, place]
-        result[:, column, row] = -sign * vectors[:, place]
-    return result
 
 
 def _times(matrices: Array, vectors: Array) -> Array:

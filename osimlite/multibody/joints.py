@@ -31,7 +31,7 @@ from osimlite.multibody.motions import (
     rotate,
     translate,
 )
-from osimlite.multibody.spatial import Array, RelativeMotion, inverse, rotation_about, transform
+from osimlite.multibody.spatial import Array, inverse, rotation_about, transform
 from osimlite.records import dataclass, field
 from osimlite.schema.joints import MotionType
 
@@ -159,30 +159,11 @@ class Mobilizer:
     child_frame: Array = field(default_factory=transform)
     reversed: bool = False
 
-    def across(self, q: Array) -> Array:
-        """X_FM (4, 4) at the joint's own coordinates `q` (k,)."""
-        return self.across_motion(q, np.zeros(len(q))).matrix
-
-    def across_motion(self, q: Array, u: Array) -> RelativeMotion:
-        """Motion of M in F: transform, hinge matrix H_FM, velocity H u and Hdot u, all in F; q and u (k,)."""
-        motion = RelativeMotion.fixed(np.eye(4), len(q))
-        for part in self.motions:
-            motion = motion.then(part.relative(q, u))
-        return motion
-
-    def relative(self, q: Array, u: Array) -> RelativeMotion:
-        """Motion of the carried body in the carrying body, at the joint's own `q` and `u` (k,)."""
-        motion, outer = self._ends
-        for part in self.motions:
-            motion = motion.then(part.relative(q, u))
-        motion = motion.then(outer)
-        return motion.inverse() if self.reversed else motion
-
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
         """The way from the carrying to the carried body as fixed transforms and one-axis motions, in order.
 
-        Its product equals the transform of :meth:`relative`; the numbers in ``coordinates`` of each motion
-        are places among `coordinates` of this mobilizer. This is all that a program with one-axis joints
+        The numbers in ``coordinates`` of each motion are
+        places among `coordinates` of this mobilizer. This is all that a program with one-axis joints
         needs to know.
         """
         motions = (Fixed(self.parent_frame), *self.motions, Fixed(inverse(self.child_frame)))
@@ -221,14 +202,6 @@ class Mobilizer:
             tuple(self.coordinates[place] for place in motion.coordinates)
             for motion in self.motions
             if type(motion).rates is not Motion.rates
-        )
-
-    @cached_property
-    def _ends(self) -> tuple[RelativeMotion, RelativeMotion]:
-        count = len(self.coordinates)
-        return (
-            RelativeMotion.fixed(self.parent_frame, count),
-            RelativeMotion.fixed(inverse(self.child_frame), count),
         )
 
 

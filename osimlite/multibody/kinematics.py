@@ -1,4 +1,4 @@
-"""Where every body of a mechanism is and how it moves, in one pass from the root outwards.
+"""Where every body of a mechanism is and how it moves, as the kernels find it.
 
 Arrays over bodies have one row more than there are bodies: the last is ground, which -1, the parent index of a
 body that ground carries, picks out. All vectors are along the axes of ground; spatial velocities and accelerations
@@ -7,31 +7,106 @@ stack the angular part over the linear part of the body's origin.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array, carried, cross, skew, transform, turned
-from osimlite.records import dataclass
+from osimlite.kernels.layout import LINK_WORK, MODEL, WORK
+from osimlite.kernels.motion import move, place
+from osimlite.kernels.pointers import Floats
+from osimlite.multibody.program import Program, program_of
+from osimlite.multibody.spatial import Array, cross, skew, skews, transform
 
 if TYPE_CHECKING:
     from osimlite.multibody.mechanism import Mechanism
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Kinematics:
-    """A mechanism of b bodies and n coordinates at one state."""
+    """A mechanism of b bodies and n coordinates at one state.
 
-    mechanism: Mechanism
-    q: Array  # coordinate values (n,)
-    u: Array  # generalized speeds (n,)
-    rotations: Array  # of each body in ground (b + 1, 3, 3)
-    origins: Array  # of each body in ground (b + 1, 3), m
-    jacobians: Array  # from the n speeds to the velocity of each body (b + 1, 6, n)
-    velocities: Array  # of each body in ground (b + 1, 6)
-    biases: Array  # the accelerations (b + 1, 6) that the bodies have while all udot are zero
-    time: float = 0.0  # what prescribed motions go by (s)
+    Args:
+        mechanism: what moves.
+        q: coordinate values (n,).
+        u: generalized speeds (n,).
+        time: what prescribed motions go by (s).
+    """
+
+    def __init__(self, mechanism: Mechanism, q: Array, u: Array, time: float = 0.0) -> None:
+        self.mechanism, self.q, self.u, self.time = mechanism, q, u, time
+
+    @cached_property
+    def program(self) -> Program:
+        """The mechanism, packed."""
+        return program_of(self.mechanism)
+
+    @cached_property
+    def vectors(self) -> tuple[Floats, Floats, Floats]:
+        """Work vector, state, and rates, when the links have been moved; no numbers where they cannot be."""
+        s, x = self.program.s, self.program.x
+        w, y, f = self.program.state(self.q, self.u)
+        w[WORK.TIME] = self.time
+        try:
+            place(s, x, w, y, f)
+            move(s, x, w, y, f)
+        except (ArithmeticError, ValueError):
+            # An angle that is not finite, and the like.
+            np.frombuffer(w)[WORK.SIZE :] = np.nan
+        return w, y, f
+
+    @cached_property
+    def rotations(self) -> Array:
+        """Of each body in ground (b + 1, 3, 3)."""
+        return self._links[:, :9].reshape(-1, 3, 3) @ self.program.frames[:, :3, :3]
+
+    @cached_property
+    def origins(self) -> Array:
+        """Of each body in ground (b + 1, 3), m."""
+        rows = self._links
+        turned = rows[:, :9].reshape(-1, 3, 3) @ self.program.frames[:, :3, 3:]
+        return rows[:, LINK_WORK.POSITION : LINK_WORK.POSITION + 3] + turned[:, :, 0]
+
+    @cached_property
+    def jacobians(self) -> Array:
+        """From the n speeds to the velocity of each body (b + 1, 6, n)."""
+        program, size = self.program, len(self.q)
+        first = program.s[MODEL.WORK_COLUMN]
+        columns = np.frombuffer(self.vectors[0])[first : first + 6 * size].reshape(size, 6)[program.freedoms].T
+        result = np.empty((len(program.links), 6, size))
+        result[:, :3], result[:, 3:] = columns[:3], columns[3:] - skews(self._arms) @ columns[:3]
+        result.swapaxes(1, 2)[program.still] = 0.0
+        return result
+
+    @cached_property
+    def velocities(self) -> Array:
+        """Of each body in ground (b + 1, 6)."""
+        result = self._links[:, LINK_WORK.VELOCITY : LINK_WORK.VELOCITY + 6].copy()
+        result[:, 3:] += np.cross(result[:, :3], self._arms)
+        return result
+
+    @cached_property
+    def biases(self) -> Array:
+        """The accelerations (b + 1, 6) that the bodies have while all udot are zero."""
+        result = self._links[:, LINK_WORK.ACCELERATION : LINK_WORK.ACCELERATION + 6].copy()
+        # Those of the links are of points that pass an origin.
+        w, v = np.split(self.velocities, 2, axis=1)
+        result[:, 3:] += np.cross(result[:, :3], self._arms) + np.cross(w, v)
+        return result
+
+    @cached_property
+    def _links(self) -> Array:
+        """What the kernels find of the link of each body, and of ground as the last (b + 1, LINK_WORK.SIZE)."""
+        s = self.program.s
+        first, count, size = s[MODEL.WORK_LINK], s[MODEL.LINKS], LINK_WORK.SIZE
+        result = np.zeros((count + 1, size))
+        result[:-1] = np.frombuffer(self.vectors[0])[first : first + size * count].reshape(count, size)
+        result[-1, [0, 4, 8]] = 1.0
+        return result[self.program.links]
+
+    @cached_property
+    def _arms(self) -> Array:
+        """From the origin of the spatial vectors to that of each body (b + 1, 3), m."""
+        return self.origins - self._links[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
 
     def transform(self, body: int) -> Array:
         """The body in ground (4, 4)."""
@@ -61,39 +136,3 @@ class Kinematics:
     def accelerations(self, udot: Array) -> Array:
         """Spatial accelerations of all bodies (b + 1, 6) for the derivatives `udot` (n,) of the speeds."""
         return self.biases + self.jacobians @ udot
-
-
-def kinematics(
-    mechanism: Mechanism, q: Array, u: Array, time: float = 0.0, *, bodies: Iterable[int] | None = None
-) -> Kinematics:
-    """Poses, Jacobians, velocities and velocity-dependent accelerations at `q` (n,), `u` (n,) and `time` (s).
-
-    With `bodies`, the rows of all others that do not carry one of them mean nothing.
-    """
-    count, size = len(mechanism.bodies), len(q)
-    rotations, origins = np.empty((count + 1, 3, 3)), np.zeros((count + 1, 3))
-    # The columns of RelativeMotion, for each body in ground.
-    blocks = np.zeros((count + 1, 6, size + 2))
-    rotations[-1] = np.eye(3)
-    for index in range(count) if bodies is None else sorted(_with_carriers(mechanism, bodies)):
-        body = mechanism.bodies[index]
-        parent, own = body.parent, list(body.mobilizer.coordinates)
-        motion = body.mobilizer.relative(q[own], u[own])
-        arm = rotations[parent] @ motion.translation
-        moved = turned(rotations[parent], motion.block)
-        rotations[index] = rotations[parent] @ motion.rotation
-        origins[index] = origins[parent] + arm
-        blocks[index] = carried(blocks[parent], arm, moved[:, -2])
-        blocks[index][:, [*own, size, size + 1]] += moved
-    return Kinematics(
-        mechanism, q, u, rotations, origins, blocks[:, :, :size], blocks[:, :, size], blocks[:, :, size + 1], time
-    )
-
-
-def _with_carriers(mechanism: Mechanism, bodies: Iterable[int]) -> set[int]:
-    result: set[int] = set()
-    for body in bodies:
-        while body >= 0 and body not in result:
-            result.add(body)
-            body = mechanism.bodies[body].parent
-    return result

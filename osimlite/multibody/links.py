@@ -176,7 +176,7 @@ def _operations(
         elif still:
             q = np.zeros(len(own))
             q[list(motion.coordinates)] = [mechanism.coordinates[place].default_value for place in places]
-            matrix = motion.relative(q, np.zeros(len(own))).matrix
+            matrix = motion.placed(q)
             frame = frame @ (inverse(matrix) if mobilizer.reversed else matrix)
         elif isinstance(motion, AxisMotion):
             axis = -motion.axis if mobilizer.reversed else motion.axis

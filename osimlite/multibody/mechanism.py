@@ -22,7 +22,7 @@ from osimlite.multibody.constraints import Constraint, Lock, Prescribed
 from osimlite.multibody.dynamics import MassCentres, Wrench
 from osimlite.multibody.extremes import methods_of_any_numbers
 from osimlite.multibody.joints import Mobilizer
-from osimlite.multibody.kinematics import Kinematics, kinematics
+from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.parts import (
     GROUND,
     CoordinateInfo,
@@ -173,7 +173,7 @@ class Mechanism:
     def at(self, q: Values, u: Values | None = None, time: float = 0.0) -> Kinematics:
         """Poses and velocities of all bodies (u None: at rest), from which everything else follows."""
         values = self.values(q)
-        return kinematics(self, values, np.zeros(len(values)) if u is None else self.speeds(u), time)
+        return Kinematics(self, values, np.zeros(len(values)) if u is None else self.speeds(u), time)
 
     # ------------------------------------------------------------------------------------------ kinematics
     def body_transforms(self, q: Values) -> dict[str, Array]:

@@ -9,19 +9,17 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Literal
+from functools import reduce
+from typing import Any, Literal
 
 import numpy as np
 
 from osimlite.errors import SimulationError
+from osimlite.kernels.ball_joint import angle_drift, angle_row
 from osimlite.multibody.functions import IDENTITY, Constant, Function
 from osimlite.multibody.spatial import (
     Array,
-    RelativeMotion,
-    cross,
     rotation_about,
-    rotation_xyz,
-    skew,
     transform,
 )
 from osimlite.multibody.spatial import inverse as inverse_transform
@@ -36,12 +34,12 @@ class Motion(ABC):
     coordinates: tuple[int, ...]
 
     @abstractmethod
-    def relative(self, q: Array, u: Array) -> RelativeMotion:
-        """Motion of the outgoing frame in the incoming frame."""
-
-    @abstractmethod
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
         """The same transform as a product of fixed transforms and motions about or along one axis."""
+
+    def placed(self, q: Array) -> Array:
+        """The outgoing frame in the incoming frame (4, 4)."""
+        return reduce(np.matmul, (part.placed(q) for part in self.elementary()), np.eye(4))
 
     def rates(self, q: Array) -> Array | None:
         """N (k, k) with qdot = N u for these `coordinates`; None if the speeds are the rates."""
@@ -59,9 +57,9 @@ class Fixed(Motion):
     matrix: Array
     coordinates: tuple[int, ...] = ()
 
-    def relative(self, q: Array, u: Array) -> RelativeMotion:
-        """A frame at rest."""
-        return RelativeMotion.fixed(self.matrix, len(q))
+    def placed(self, q: Array) -> Array:
+        """The frame as it is."""
+        return self.matrix
 
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
         """Itself."""
@@ -90,19 +88,12 @@ class AxisMotion(Motion):
         """How far the motion goes (rad or m)."""
         return self.function.evaluate(q[list(self.coordinates)])[0]
 
-    def relative(self, q: Array, u: Array) -> RelativeMotion:
+    def placed(self, q: Array) -> Array:
         """The outgoing frame turned about or moved along the axis."""
-        own = list(self.coordinates)
-        amount, gradient, hessian = self.function.evaluate(q[own])
-        rows = slice(0, 3) if self.kind == "rotate" else slice(3, 6)
-        speeds, along = u[own], np.zeros(len(q) + 2)
-        along[own] = gradient
-        along[-2:] = gradient @ speeds, speeds @ hessian @ speeds
-        block = np.zeros((6, len(q) + 2))
-        block[rows] = np.outer(self.axis, along)
+        amount = self.amount(q)
         if self.kind == "rotate":
-            return RelativeMotion(rotation_about(self.axis, amount), np.zeros(3), block)
-        return RelativeMotion(np.eye(3), self.axis * amount, block)
+            return transform(rotation_about(self.axis, amount))
+        return transform(None, amount * self.axis)
 
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
         """Itself."""
@@ -126,32 +117,6 @@ class SimbodyAccelerationError(Motion):
     turns: tuple[AxisMotion, ...]
     coordinates: tuple[int, ...] = ()
 
-    def relative(self, q: Array, u: Array) -> RelativeMotion:
-        """A frame at rest that all the same has the error as its angular acceleration."""
-        motion = RelativeMotion.fixed(np.eye(4), len(q))
-        motion.block[:3, -1] = np.einsum("iab,a,b->i", self.curvature(q), u, u)
-        return motion
-
-    def curvature(self, q: Array) -> Array:
-        """H (3, k, k) of the error: its component i is uᵀ H[i] u."""
-        count = len(q)
-        # By coordinate: what a unit speed of it does to each angle.
-        axes, shares, rotation = [], np.zeros((3, count)), np.eye(3)
-        for row, turn in enumerate(self.turns):
-            own = list(turn.coordinates)
-            amount, gradient, _ = turn.function.evaluate(q[own])
-            shares[row, own] = gradient
-            axes.append(rotation @ turn.axis)
-            rotation = rotation @ rotation_about(turn.axis, amount)
-        along, curvature = np.array(axes).T, np.zeros((3, count, count))
-        for row in (1, 2):
-            # (3, k): the rate of this axis by what Simbody takes for the rates of the angles before it, less the true.
-            theirs = np.zeros((3, count))
-            theirs[:, :row] = along @ shares[:, :row]
-            wrong = -skew(axes[row]) @ (theirs - along[:, :row] @ shares[:row])
-            curvature += wrong[:, :, None] * shares[row]
-        return curvature
-
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
         """Three turns that stay at zero and accelerate all the same; nothing where there is no error."""
         turned = [set() if isinstance(turn.function, Constant) else set(turn.coordinates) for turn in self.turns]
@@ -168,22 +133,16 @@ class SimbodyAccelerationError(Motion):
 
 @dataclass(frozen=True, eq=False)
 class AccelerationErrorAngle(Function):
-    """An angle of zero with a rate of zero; its second derivative is a component of a `SimbodyAccelerationError`."""
+    """An angle of zero with a rate of zero; its acceleration is a component of a `SimbodyAccelerationError`."""
 
     drift: SimbodyAccelerationError
     places: tuple[int, ...]  # of its arguments among the coordinates of the joint
     component: int
 
     def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
-        """Zero, zeros, and a Hessian (k, k) that is no derivative of these."""
-        hessian = self._curvature(arguments)[self.component]
-        return 0.0, np.zeros(len(arguments)), 0.5 * (hessian + hessian.T)
-
-    def _curvature(self, arguments: Array) -> Array:
-        own = list(self.places)
-        q = np.zeros(max(own, default=-1) + 1)
-        q[own] = arguments
-        return self.drift.curvature(q)[np.ix_((0, 1, 2), own, own)]
+        """Zero and zeros: what it accelerates by is no derivative of these."""
+        size = len(arguments)
+        return 0.0, np.zeros(size), np.zeros((size, size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,20 +156,6 @@ class SphericalMotion(Motion):
 
     coordinates: tuple[int, ...]
     radii: Array = field(default_factory=lambda: np.zeros(3))
-
-    def relative(self, q: Array, u: Array) -> RelativeMotion:
-        """The outgoing frame turned by the angles, its origin on the ellipsoid."""
-        own = list(self.coordinates)
-        rotation = rotation_xyz(q[own])
-        normal, w = rotation[:, 2], u[own]
-        drift = cross(w, normal)
-        block = np.zeros((6, len(q) + 2))
-        block[:3, own] = np.eye(3)
-        block[3:, own] = -self.radii[:, None] * skew(normal)
-        block[:3, -2] = w
-        block[3:, -2] = self.radii * drift
-        block[3:, -1] = self.radii * cross(w, drift)
-        return RelativeMotion(rotation, self.radii * normal, block)
 
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
         """The three translations to the ellipsoid, if it has a size, and the three rotations."""
@@ -227,33 +172,26 @@ class SphericalMotion(Motion):
 
     def rates(self, q: Array) -> Array:
         """N (3, 3); SimulationError where the second angle makes it singular."""
-        s1, s2, c1, c2 = self._angles(q)
-        return np.array(
-            ((1.0, s1 * s2 / c2, -c1 * s2 / c2), (0.0, c1, s1), (0.0, -s1 / c2, c1 / c2)),
-        )
+        own: Any = self._angles(q)
+        return np.array([angle_row(own, _FIRST, part) for part in range(3)])
 
     def rate_bias(self, q: Array, u: Array) -> Array:
         """Ndot u (3,); SimulationError where the second angle makes N singular."""
-        s1, s2, c1, c2 = self._angles(q)
-        rates = self.rates(q)
-        r1, r2, r3 = (rates @ u[list(self.coordinates)]).tolist()
-        # w = B qdot with columns x, Rx(q1) y, Rx(q1) Ry(q2) z; hence Ndot u = -N Bdot qdot.
-        drift = (
-            c2 * r2 * r3,
-            -s1 * r1 * r2 + (s1 * s2 * r2 - c1 * c2 * r1) * r3,
-            c1 * r1 * r2 - (s1 * c2 * r1 + c1 * s2 * r2) * r3,
-        )
-        return -rates @ np.array(drift)
+        own, rows = self._angles(q), self.rates(q)
+        rates: Any = (rows @ u[list(self.coordinates)]).tolist()
+        return np.array([angle_drift(own, rates, _FIRST, tuple(row)) for row in rows.tolist()])
 
-    def _angles(self, q: Array) -> tuple[float, float, float, float]:
-        first, second = q[self.coordinates[0]], q[self.coordinates[1]]
-        s1, s2, c1, c2 = math.sin(first), math.sin(second), math.cos(first), math.cos(second)
-        if abs(c2) < 1e-12:
+    def _angles(self, q: Array) -> Any:
+        angles = q[list(self.coordinates)].tolist()
+        if abs(math.cos(angles[1])) < 1e-12:
             raise SimulationError(
                 "the second of three angles stands at ±90 degrees, where their rates are not defined; "
                 "choose another pose, or turn the frames of the joint"
             )
-        return s1, s2, c1, c2
+        return angles
+
+
+_FIRST: Any = (0, 1, 2)
 
 
 @dataclass(frozen=True)

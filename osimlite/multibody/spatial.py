@@ -1,8 +1,4 @@
-"""Rotations, rigid transforms, and the algebra of one frame's motion in another.
-
-Spatial vectors stack the angular part over the linear part; the linear part belongs to the origin of the
-moving frame.
-"""
+"""Rotations and rigid transforms."""
 
 from __future__ import annotations
 
@@ -10,8 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from osimlite.records import dataclass
 
 Array = NDArray[np.float64]
 
@@ -27,6 +21,15 @@ def skew(v: Array) -> Array:
     """The matrix [v] with [v] a = v × a."""
     x, y, z = v.tolist()
     return np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+
+
+def skews(vectors: Array) -> Array:
+    """The matrices [v] with [v] a = v × a of many vectors: (b, 3) to (b, 3, 3)."""
+    result = np.zeros((len(vectors), 3, 3))
+    for row, column, place, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):
+        result[:, row, column] = sign * vectors[:, place]
+        result[:, column, row] = -sign * vectors[:, place]
+    return result
 
 
 def rotation_about(axis: Array, angle: float) -> Array:
@@ -124,81 +127,3 @@ def inverse(matrix: Array) -> Array:
     """Inverse of a homogeneous matrix."""
     rotation = matrix[:3, :3].T
     return transform(rotation, -rotation @ matrix[:3, 3])
-
-
-def turned(rotation: Array, block: Array) -> Array:
-    """Spatial vectors, the columns of `block` (6, c), turned by `rotation` (3, 3)."""
-    return (rotation @ block.reshape(2, 3, -1)).reshape(6, -1)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RelativeMotion:
-    """Where frame B is in frame A, and how k generalized speeds move it there. Everything is expressed in A.
-
-    The columns of `block` (6, k + 2) are spatial vectors: the Jacobian of the k speeds, then the velocity, then the
-    part of the acceleration that does not depend on the derivatives of the speeds. They stand together because
-    composing motions does nearly the same to all of them.
-    """
-
-    rotation: Array
-    translation: Array
-    block: Array
-
-    @classmethod
-    def fixed(cls, matrix: Array, speeds: int) -> RelativeMotion:
-        """A frame that does not move, seen among `speeds` generalized speeds."""
-        return cls(matrix[:3, :3], matrix[:3, 3], np.zeros((6, speeds + 2)))
-
-    @property
-    def matrix(self) -> Array:
-        """The homogeneous matrix (4, 4) of B in A."""
-        return transform(self.rotation, self.translation)
-
-    @property
-    def jacobian(self) -> Array:
-        """The matrix (6, k) from the speeds to the velocity of B in A."""
-        return self.block[:, :-2]
-
-    @property
-    def velocity(self) -> Array:
-        """Spatial velocity (6,) of B in A."""
-        return self.block[:, -2]
-
-    @property
-    def bias(self) -> Array:
-        """Spatial acceleration (6,) of B in A, as seen in A, while the derivatives of the speeds are zero."""
-        return self.block[:, -1]
-
-    def then(self, other: RelativeMotion) -> RelativeMotion:
-        """Motion of C in A, if `self` is that of B in A and `other` that of C in B."""
-        arm = self.rotation @ other.translation
-        moved = turned(self.rotation, other.block)
-        block = carried(self.block, arm, moved[:, -2])
-        block += moved
-        return RelativeMotion(self.rotation @ other.rotation, self.translation + arm, block)
-
-    def inverse(self) -> RelativeMotion:
-        """Motion of A in B, for the same generalized speeds."""
-        back, p = self.rotation.T, self.translation
-        w, v = self.block[:3, -2], self.block[3:, -2]
-        block = self.block.copy()
-        block[3:] += skew(p) @ self.block[:3]
-        block[3:, -1] += cross(w, cross(w, p) - 2.0 * v)
-        return RelativeMotion(back, -back @ p, -turned(back, block))
-
-
-def carried(block: Array, arm: Array, relative_velocity: Array) -> Array:
-    """What a frame C that moves in B has from the motion of B in A; add its own motion in B, turned into A.
-
-    Args:
-        block: columns of :class:`RelativeMotion` of B in A (6, c).
-        arm: from B's origin to C's origin, in A (3,).
-        relative_velocity: spatial velocity of C in B, in A (6,); it makes the Coriolis acceleration.
-    """
-    result = block.copy()
-    result[3:] -= skew(arm) @ block[:3]
-    w = block[:3, -2]
-    if w.any():
-        result[:3, -1] += cross(w, relative_velocity[:3])
-        result[3:, -1] += cross(w, cross(w, arm) + 2.0 * relative_velocity[3:])
-    return result

@@ -162,14 +162,13 @@ class _Builder:
         if isinstance(part, Fixed):
             yield part
         elif _is_constant(part.function) or all(own[place] in self.still for place in part.coordinates):
-            values = self.values[own]
-            yield Fixed(part.relative(values, np.zeros(len(own))).matrix)
+            yield Fixed(part.placed(self.values[own]))
         elif part.function == IDENTITY or (line := as_line(part.function)) is None:
             yield part
         else:
             slope = line.slope
             first = AxisMotion(part.kind, part.axis, (0,), Constant(line.start))
-            yield Fixed(first.relative(np.zeros(1), np.zeros(1)).matrix)
+            yield Fixed(first.placed(np.zeros(1)))
             unit = abs(slope) == 1.0
             yield AxisMotion(
                 part.kind,

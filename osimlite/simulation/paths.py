@@ -14,7 +14,7 @@ from osimlite.kernels.projection import REDUNDANT
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Constraint, Lock
 from osimlite.multibody.extremes import any_numbers, methods_of_any_numbers
-from osimlite.multibody.kinematics import Kinematics, kinematics
+from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.linear import shortest, stacked
 from osimlite.multibody.mechanism import Mechanism, Values
 from osimlite.multibody.spatial import Array
@@ -196,7 +196,7 @@ class Paths:
         constraints = self.mechanism.constraints
         if all(isinstance(item, Lock) for item in constraints):
             return np.eye(len(q))
-        state = kinematics(self.mechanism, q, np.zeros(len(q)), bodies=self.mechanism.constrained)
+        state = self.mechanism.at(q)
         coupling = self.coupling_of_free(state)
         for place, lock in self._locks.items():
             others = [item for item in constraints if item is not lock]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.parts import GROUND
 from osimlite.multibody.schema_frames import Placements
 from osimlite.multibody.spatial import Array
+from osimlite.records import replace
 from osimlite.schema.joints import Joint, ScapulothoracicJoint
 from osimlite.schema.model import Model
 from osimlite.simulation.files.recorded import RecordedMotion
@@ -42,30 +45,52 @@ def loads_at_joints(model: Model, joints: Sequence[Joint], recorded: RecordedMot
         asked.append((joint, {carried[base], by_joint[placements.path(joint)]}))
         root = f"{joint.name}_{placements.path(frame).rpartition('/')[2]}"
         labels += [f"{root}_{what}{axis}" for what in "FM" for axis in "XYZ"]
+    # OpenSim moves a scapula by two mobilizers: along the ellipsoid, and about the axis of winging.
+    hinges = [
+        [_hinges(mechanism, body, apart=isinstance(joint, ScapulothoracicJoint)) for body in bodies]
+        for joint, bodies in asked
+    ]
     rows = np.zeros((len(recorded.times), len(joints), 2, 3))
     for row, q, own in zip(rows, recorded.values, forces, strict=True):
         state = mechanism.at(q)
-        for number, (joint, bodies) in enumerate(asked):
-            for body in bodies:
-                # OpenSim moves a scapula by two mobilizers: along the ellipsoid, and about the axis of winging.
-                row[number] += _load(mechanism, state, body, own, isinstance(joint, ScapulothoracicJoint))
+        for number, each in enumerate(hinges):
+            row[number] = sum(_load(state, *hinge, own) for hinge in each)
     title = "Inverse Dynamics Body Forces at Specified Joints"
     return StoTable(title, recorded.times, tuple(labels), rows.reshape(len(rows), -1))
 
 
-def _load(mechanism: Mechanism, state: Kinematics, body: int, forces: Array, apart: bool) -> Array:
-    """Force and torque (2, 3) in ground for the generalized forces (n,) of the mobilizer that carries a body.
+_Hinge = tuple[list[int], Mechanism]
+"""Coordinates, and the mechanism of one body that they move in ground."""
 
-    If `apart`, the sum of those that each of its motions has for itself.
+
+def _hinges(mechanism: Mechanism, body: int, *, apart: bool) -> tuple[int, Array, list[_Hinge]]:
+    """What the mobilizer of a body does: the body that carries it, where in that, and the hinges one after another.
+
+    If `apart`, each of its motions is a hinge of its own.
     """
-    mobilizer, own = mechanism.bodies[body].mobilizer, list(mechanism.bodies[body].mobilizer.coordinates)
-    q, u, load = state.q[own], state.u[own], np.zeros((2, 3))
+    mobilizer = mechanism.bodies[body].mobilizer
+    groups = [[motion] for motion in mobilizer.motions] if apart else [[*mobilizer.motions]]
+    hinges: list[_Hinge] = []
+    for motions in groups[::-1] if mobilizer.reversed else groups:
+        used = sorted({place for motion in motions for place in motion.coordinates})
+        renumbered: Any = [replace(m, coordinates=tuple(map(used.index, m.coordinates))) for m in motions]
+        places = [mobilizer.coordinates[place] for place in used]
+        still, count = np.eye(4), tuple(range(len(used)))
+        alone = replace(mobilizer, motions=renumbered, coordinates=count, parent_frame=still, child_frame=still)
+        carried = replace(mechanism.bodies[body], parent=GROUND, mobilizer=alone)
+        infos = tuple(replace(mechanism.coordinates[place], locked=False, prescribed=None) for place in places)
+        hinges.append((places, Mechanism(mobilizer.joint, (carried,), infos)))
     inner = mobilizer.child_frame if mobilizer.reversed else mobilizer.parent_frame
-    rotation = state.rotations[mechanism.bodies[body].parent] @ inner[:3, :3]
-    across = [part.relative(q, u) for part in mobilizer.motions] if apart else [mobilizer.across_motion(q, u)]
-    for motion in [one.inverse() for one in reversed(across)] if mobilizer.reversed else across:
-        load += _of_hinge(motion.jacobian.T, forces[own]) @ rotation.T
-        rotation = rotation @ motion.rotation
+    return mechanism.bodies[body].parent, inner[:3, :3], hinges
+
+
+def _load(state: Kinematics, parent: int, inner: Array, hinges: Sequence[_Hinge], forces: Array) -> Array:
+    """Force and torque (2, 3) in ground for the generalized forces (n,) at hinges one after another."""
+    rotation, load = state.rotations[parent] @ inner, np.zeros((2, 3))
+    for places, hinge in hinges:
+        across = hinge.at(state.q[places])
+        load += _of_hinge(across.jacobians[0].T, forces[places]) @ rotation.T
+        rotation = rotation @ across.rotations[0]
     return load
 
 

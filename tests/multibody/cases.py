@@ -105,6 +105,13 @@ def mechanism_of(case: dict[str, Any], *, turned_round: bool = False) -> Mechani
     return Mechanism("case", (body,), coordinates)
 
 
+def alone(mobilizer: Mobilizer) -> Mechanism:
+    """Ground and one body that a joint carries."""
+    names = [f"q{k}" for k in mobilizer.coordinates]
+    infos = tuple(CoordinateInfo(name, f"{mobilizer.joint}/{name}", mobilizer.joint, "coupled") for name in names)
+    return Mechanism("alone", (MobileBody("C", "/bodyset/C", -1, MassProperties(1.0), mobilizer),), infos)
+
+
 @cache
 def mixed_tree() -> Mechanism:
     """The tree of fixtures/kinematics/mixed_joint_tree.osim: 10 bodies, 24 coordinates, 10 joint types."""

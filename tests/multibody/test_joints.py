@@ -11,7 +11,8 @@ from osimlite.multibody.joints import MOTIONS, Mobilizer, TransformAxis, constan
 from osimlite.multibody.motions import AxisMotion, Fixed
 from osimlite.multibody.spatial import inverse, rotation_about, transform
 from osimlite.schema import joints
-from tests.multibody.cases import load, mechanism_of
+from tests.multibody.cases import alone, load, mechanism_of
+from tests.multibody.independent.motion import carrying
 from tests.multibody.strategies import JOINT_TYPES, coordinates_of, motions_of
 
 CASES = load("joint_kinematics_cases.json")["cases"]
@@ -69,8 +70,8 @@ def test_a_joint_is_a_chain_of_one_axis_motions(joint_type, seed, turned_round):
             product = product @ transform(rotation_about(part.axis, part.amount(q)))
         else:
             product = product @ transform(None, part.axis * part.amount(q))
-    expected = frames[0] @ mobilizer.across(q) @ inverse(frames[1])
-    assert product == pytest.approx(inverse(expected) if turned_round else expected, abs=1e-13)
+    assert product == pytest.approx(alone(mobilizer).at(q).transform(0), abs=1e-13)
+    assert product == pytest.approx(carrying(mobilizer, q, q).matrix, abs=1e-13)
 
 
 def test_the_joints_of_urdf_chains_name_their_coordinate():
@@ -113,7 +114,8 @@ def test_rates_are_refused_where_they_are_not_defined(joint_type):
         mobilizer.rate_matrix(q)
     with pytest.raises(SimulationError, match=r"/jointset/hip.*±90 degrees"):
         mobilizer.rate_bias(q, q)
-    assert np.isfinite(mobilizer.across_motion(q, np.ones(count)).block).all()
+    state = alone(mobilizer).at(q, np.ones(count))
+    assert np.isfinite(state.jacobians).all() and np.isfinite(state.biases).all()
 
 
 def test_an_axis_needs_a_direction():
@@ -130,15 +132,16 @@ def test_bias_and_rate_bias_are_derivatives(joint_type, seed, turned_round):
     count = coordinates_of(motions)
     mobilizer = Mobilizer("/j", joint_type, motions, tuple(range(count)), reversed=turned_round)
     q, u, step = rng.uniform(-1.0, 1.0, count), rng.uniform(-2.0, 2.0, count), 1e-5
-    middle = mobilizer.relative(q, u)
-    assert middle.jacobian @ u == pytest.approx(middle.velocity, abs=1e-13)
+    mechanism = alone(mobilizer)
+    middle = mechanism.at(q, u)
+    assert middle.jacobians[0] @ u == pytest.approx(middle.velocities[0], abs=1e-13)
     rates = mobilizer.rate_matrix(q)
     qdot, qddot = rates @ u, mobilizer.rate_bias(q, u)
     later, earlier = (q + side * step * qdot + 0.5 * step**2 * qddot for side in (1.0, -1.0))
-    high, low = mobilizer.relative(later, u), mobilizer.relative(earlier, u)
-    assert middle.bias == pytest.approx((high.velocity - low.velocity) / (2 * step), abs=2e-7)
-    velocity = (high.translation - low.translation) / (2 * step)
-    assert middle.velocity[3:] == pytest.approx(velocity, abs=2e-7)
+    high, low = mechanism.at(later, u), mechanism.at(earlier, u)
+    assert middle.biases[0] == pytest.approx((high.velocities[0] - low.velocities[0]) / (2 * step), abs=2e-7)
+    velocity = (high.origins[0] - low.origins[0]) / (2 * step)
+    assert middle.velocities[0, 3:] == pytest.approx(velocity, abs=2e-7)
     difference = (mobilizer.rate_matrix(later) - mobilizer.rate_matrix(earlier)) @ u / (2 * step)
     assert qddot == pytest.approx(difference, rel=1e-6, abs=2e-7)
 
@@ -147,7 +150,8 @@ def test_a_rod_that_bends_evenly_is_an_arc():
     """As long as the rod, upright at its start, along the child's Y axis at its end; straight where it is not bent."""
     length, q = 0.7, np.array((0.6, -0.9, 0.3))
     motions = constant_curvature(length, (0.1, 0.2, -0.3))
-    end = Mobilizer("/j", "ConstantCurvatureJoint", motions, (0, 1, 2)).across(q)
+    rod = alone(Mobilizer("/j", "ConstantCurvatureJoint", motions, (0, 1, 2)))
+    end = rod.at(q).transform(0)
     along, place = end[:3, 1], end[:3, 3]
     bend = np.arccos(along[1])
     radius = length / bend
@@ -156,5 +160,5 @@ def test_a_rod_that_bends_evenly_is_an_arc():
     assert np.linalg.norm(arm) == pytest.approx(radius, rel=1e-12)
     assert arm @ along == pytest.approx(0.0, abs=1e-12)
     assert np.arctan2(place[1], radius - np.linalg.norm(place[[0, 2]])) == pytest.approx(bend, rel=1e-12)
-    straight = Mobilizer("/j", "ConstantCurvatureJoint", motions, (0, 1, 2)).across(np.array((-0.1, -0.2, 0.3)))
+    straight = rod.at(np.array((-0.1, -0.2, 0.3))).transform(0)
     assert straight == pytest.approx(np.eye(4) + np.outer((0, 1, 0, 0), (0, 0, 0, length)), abs=1e-15)

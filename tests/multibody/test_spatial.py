@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.multibody.spatial import (
-    RelativeMotion,
     angles_xyz,
     cross,
     inverse,
@@ -17,6 +16,7 @@ from osimlite.multibody.spatial import (
     skew,
     transform,
 )
+from tests.multibody.independent.motion import RelativeMotion
 
 vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(np.array)
 seeds = st.integers(0, 2**32 - 1)

@@ -21,7 +21,7 @@ from osimlite.translate.mjcf.bodies import LEAST_MASS
 from osimlite.translate.mjcf.couplings import PULLED, along, helper
 from osimlite.translate.mjcf.draft import Draft, Follower, Tied, Value, add, pose, tidy
 from osimlite.translate.mjcf.fits import fitted
-from osimlite.translate.mjcf.poses import EXACT, Poses, Truth, arm_errors, bodies_of, random_poses
+from osimlite.translate.mjcf.poses import EXACT, Poses, Truth, arm_errors, random_poses
 from osimlite.translate.mjcf.routes import Router
 from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measured
 
@@ -42,10 +42,9 @@ def add_paths(draft: Draft) -> None:
         return
     exact = Paths(draft.model)
     fits = draft.options.fit != "none"
-    bodies = bodies_of(exact)
-    poses, truth = random_poses(exact, FITTED if fits else CHOSEN, 0, bodies)
-    held, held_truth = random_poses(exact, HELD_OUT, 1, bodies)
-    others, other_truth = random_poses(exact, TRIED, 2, bodies) if fits else (poses, truth)
+    poses, truth = random_poses(exact, FITTED if fits else CHOSEN, 0)
+    held, held_truth = random_poses(exact, HELD_OUT, 1)
+    others, other_truth = random_poses(exact, TRIED, 2) if fits else (poses, truth)
     default = exact.lengths(draft.default_state[0])
     writer = _Writer(draft)
     for path, given in owners.items():

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.multibody.constraints import Coupler
-from osimlite.multibody.kinematics import kinematics
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
-from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.paths import Paths
 from osimlite.translate.fidelity import Error
 
@@ -24,10 +22,7 @@ EXACT = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """P poses of a mechanism of b bodies and n coordinates, of which m move; arrays over bodies end with ground.
-
-    Only the bodies that were asked for, and those that carry them, have numbers that mean something.
-    """
+    """P poses of a mechanism of b bodies and n coordinates, of which m move; arrays over bodies end with ground."""
 
     q: Array  # values of the coordinates (P, n)
     moving: Array  # places (m,) of the coordinates that move by themselves: neither locked nor coupled
@@ -119,21 +114,11 @@ def free_coordinates(mechanism: Mechanism) -> list[int]:
     ]
 
 
-def bodies_of(paths: Paths) -> set[int]:
-    """Indices of the bodies that paths run along, and of those that constraints bind."""
-    routes = [route for route in paths.routes.values() if isinstance(route, ThroughPoints)]
-    along = {node.body for route in routes for node in (*route.points, *(each.tangent for each in route.surfaces))}
-    return along.union(paths.mechanism.constrained)
-
-
-def random_poses(
-    paths: Paths, count: int, seed: int = 0, bodies: Iterable[int] | None = None
-) -> tuple[Poses, Mapping[str, Truth]]:
-    """Random poses, and what each path does in them; `bodies` are those that are placed, all if None."""
+def random_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mapping[str, Truth]]:
+    """Random poses, and what each path does in them."""
     mechanism = paths.mechanism
     values, moving = random_values(mechanism, count, seed), np.array(free_coordinates(mechanism), dtype=int)
-    rest = np.zeros(values.shape[1])
-    states = [kinematics(mechanism, row, rest, bodies=bodies) for row in values]
+    states = [mechanism.at(row) for row in values]
     couplings = [paths.coupling_of_free(state) for state in states]
     rates = np.nan_to_num(np.stack([coupling[:, moving] for coupling in couplings]))
     poses = Poses(

@@ -11,7 +11,7 @@ from osimlite.schema.functions import LinearFunction
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import PathPoint
 from osimlite.translate.mjcf import moving
-from osimlite.translate.mjcf.poses import bodies_of, random_poses
+from osimlite.translate.mjcf.poses import random_poses
 
 
 def test_the_other_side_of_a_body_takes_no_second_fit() -> None:
@@ -47,7 +47,7 @@ def test_poses_know_what_paths_say_one_by_one() -> None:
         spring.geometry_path.path_point_set.objects.append(point)
     model.add(spring)
     paths = osimlite.paths(model)
-    poses, truth = random_poses(paths, 5, bodies=bodies_of(paths))
+    poses, truth = random_poses(paths, 5)
     names = [paths.mechanism.coordinates[place].path for place in poses.moving]
     assert names == ["/jointset/j0/q0", "/jointset/j3/q3"]
     for number, q in enumerate(poses.q):

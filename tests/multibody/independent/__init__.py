@@ -1,0 +1,1 @@
+"""The mechanics of mechanisms in numpy, by other formulas than the kernels': what these are checked by."""
