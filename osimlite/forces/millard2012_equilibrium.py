@@ -19,6 +19,7 @@ from osimlite.forces.muscles import (
     cos_pennation,
     fiber_length_along,
     first_order_activation_rate,
+    first_order_activation_slope,
 )
 
 VELOCITY_ROUNDS, LENGTH_ROUNDS = 20, 200
@@ -202,6 +203,63 @@ def muscle_with(
         tension = tendon * m.strength
     speed = velocity * m.fastest * m.optimal
     return tension, active, fiber, cos, by_length, by_velocity, pull, passive, is_found, fibers.change, speed, spring
+
+
+def millard2012_slopes(
+    now: MuscleInputs,
+    m: Millard2012Equilibrium,
+    curves: MillardCurves,
+    activation: float,
+    fiber_length: float,
+    cos_pennation: float,
+    fiber_velocity: float,
+) -> tuple[float, float, float, float, float, float, float, float, float, float, float, float]:
+    """Derivatives of the tension, of the rate of activation and of the fiber velocity.
+
+    Args:
+        now, m, curves: as of `millard2012_equilibrium`.
+        activation: what that found, with the three that follow.
+        fiber_length: m.
+        cos_pennation: of pennation.
+        fiber_velocity: m/s.
+
+    Returns:
+        Of each of the three its derivatives by length and rate of the path, activation and fiber length.
+    """
+    cos, velocity = cos_pennation, fiber_velocity / (m.fastest * m.optimal)
+    by_length, length_slope = curve_value(curves.active, fiber_length / m.optimal)
+    elastic, elastic_slope = curve_value(curves.passive, fiber_length / m.optimal)
+    by_velocity, velocity_slope = curve_value(curves.velocity, velocity)
+    # What fibers bear by their length and by their velocity, and how pennation and reach along the tendon change.
+    stiffness = (activation * length_slope * by_velocity + elastic_slope) / m.optimal
+    viscosity = activation * by_length * velocity_slope + m.damping
+    turn = m.height * m.height / (fiber_length * fiber_length * fiber_length * cos)
+    reach = cos + fiber_length * turn
+    # Beyond its bounds a state changes nothing.
+    change = first_order_activation_slope(now.excitation, now.activation, m.rising, m.falling, m.least)
+    pull = by_length * by_velocity if m.least <= now.activation < 1.0 and not m.is_excited else 0.0
+    by_path = by_rate = by_activation = by_fiber = of_path = of_activation = of_fiber = 0.0
+    is_free = fiber_length > m.smallest or fiber_velocity > 0.0
+    if m.is_rigid:
+        borne = activation * by_length * by_velocity + elastic + m.damping * velocity
+        if is_free and borne > 0.0:
+            by_path = m.strength * (stiffness * cos + borne * turn + viscosity * velocity * turn) / reach
+            by_rate = m.strength * viscosity * cos * cos / (m.optimal * m.fastest)
+            by_activation = m.strength * pull * cos
+    else:
+        tendon, tendon_slope = curve_value(curves.tendon, (now.length - fiber_length * cos) / m.slack)
+        by_path = m.strength * tendon_slope / m.slack
+        gain = 0.0
+        if is_free:
+            if not m.damping > 0.0:
+                _, inverse_slope = curve_value(curves.inverse, (tendon / cos - elastic) / (activation * by_length))
+                viscosity = activation * by_length / inverse_slope
+            gain = m.fastest * m.optimal / (viscosity * cos)
+            of_path, of_activation = gain * tendon_slope / m.slack, -gain * pull * cos
+        if now.fiber_length >= m.smallest:
+            by_fiber = -by_path * reach
+            of_fiber = -of_path * reach - gain * (stiffness * cos + tendon / cos * turn)
+    return by_path, by_rate, by_activation, by_fiber, 0.0, 0.0, change, 0.0, of_path, 0.0, of_activation, of_fiber
 
 
 def millard2012_rigid(now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves) -> float:

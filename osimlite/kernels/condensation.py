@@ -52,11 +52,15 @@ def condensation_room(size: int, responses: int) -> int:
     return 2 * size * size + size + responses * (size + RESPONSE_WORK)
 
 
-def linearise(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, room: Floats) -> int:
-    """Fill the room with masses, generalized forces and derivatives at a state; f is room for its rates."""
-    size = s[MODEL.DOFS]
+def linearise(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, room: Floats, is_evaluated: float) -> int:
+    """Fill the room with masses, generalized forces and derivatives at a state; f is room for its rates.
+
+    If `is_evaluated` is not 0, the last evaluation was that of this state.
+    """
+    size, status = s[MODEL.DOFS], OUTCOME.OK
     right = at(f, size)
-    status = call(s[MODEL.LAWS], s, x, w, y, f, STAGE.VELOCITY)
+    if is_evaluated == 0.0:
+        status = call(s[MODEL.LAWS], s, x, w, y, f, STAGE.ACCELERATION)
     if status != OUTCOME.OK:
         return status
     if s[MODEL.CONSTRAINED] > 0:

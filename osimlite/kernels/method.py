@@ -15,7 +15,9 @@ REACHED, NEXT_STEP = 6, 7
 """Time (s) at the start of the step, and at its end if it was taken; step to try, and to try next."""
 EVALUATED, HAS_DERIVATIVE = 8, 9
 """How many evaluations it took; whether the derivative at the end was put behind y1."""
-MEMORY = 10
+IS_EVALUATED = 10
+"""Whether the last evaluation was that of the start of the step."""
+MEMORY = 11
 """From here on a method keeps what it likes from step to step; it begins anew where the first of that is 0."""
 
 ERRORS = 4

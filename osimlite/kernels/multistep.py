@@ -101,7 +101,7 @@ def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int,
         predict(size, method, order, rows, y1, psi)
         if h[AGE] <= 0.0 or h[AGE] > RENEWED:
             w[WORK.TIME] = t1
-            is_new = linearise(s, x, w, y1, at(y1, size), room) == OUTCOME.OK
+            is_new = linearise(s, x, w, y1, at(y1, size), room, 0.0) == OUTCOME.OK
             h[AGE], h[CONDENSED] = 1.0 if is_new else 0.0, 0.0
         if h[AGE] > 0.0 and (h[CONDENSED] == c or condense(s, c, room)):
             h[CONDENSED] = c

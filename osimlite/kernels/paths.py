@@ -53,6 +53,11 @@ there, and nothing here."""
 def path_length(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, path: int) -> tuple[float, float]:
     """Length and lengthening speed of the path of an item."""
     call(s[path + ITEM.LAW], s, x, w, y, f, path)
+    return known_length(s, w, path)
+
+
+def known_length(s: Ints, w: Floats, path: int) -> tuple[float, float]:
+    """The same as they were found last."""
     result = at(w, s[path + ITEM.RECORD])
     return result[LENGTH], result[SPEED]
 

@@ -17,6 +17,7 @@ from osimlite.kernels.method import (
     ERRORS,
     EVALUATED,
     HAS_DERIVATIVE,
+    IS_EVALUATED,
     LAST_TIME,
     MEMORY,
     NEXT_STEP,
@@ -88,7 +89,8 @@ def rosenbrock(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int
     if h[IS_NEW] == 0.0:
         w[WORK.TIME] = t0
         copy(size, y0, y1)
-        h[IS_NEW] = 1.0 if linearise(s, x, w, y1, f1, room) == OUTCOME.OK else 0.0
+        h[IS_NEW] = 1.0 if linearise(s, x, w, y1, f1, room, h[IS_EVALUATED]) == OUTCOME.OK else 0.0
+    h[IS_EVALUATED] = 0.0
     if h[IS_NEW] > 0.0 and condense(s, c, room) and staged(s, x, w, t0, step, c, y0, y1, stages, room):
         for k in range(size):
             y1[k], errors[k] = y0[k], 0.0

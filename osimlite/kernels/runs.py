@@ -13,6 +13,7 @@ from osimlite.kernels.method import (
     ACCEPTED,
     EVALUATED,
     HAS_DERIVATIVE,
+    IS_EVALUATED,
     LAST_TIME,
     MEMORY,
     NEXT_STEP,
@@ -121,6 +122,7 @@ def run(m: Motion, y: Floats, is_going: bool) -> int:
         counts[EVALUATIONS], h[MEMORY] = 0 if is_going else 1, 0.0
     if status != OUTCOME.OK or not is_finite(size, f0):
         return FAILED
+    h[IS_EVALUATED] = 0.0 if is_going else 1.0
     levels_at(m, y0, before)
     note_peaks(m, clock[0])
     while counts[REPORTED] < sizes[TIMES] and m.times[counts[REPORTED]] <= clock[0]:
@@ -146,7 +148,9 @@ def run(m: Motion, y: Floats, is_going: bool) -> int:
         if sizes[MOST_LOGGED] > 0:
             note_step(m, t1, y1, f1)
         end, stopped = t1, False
+        h[IS_EVALUATED] = 1.0 if h[HAS_DERIVATIVE] == 0.0 and s[MODEL.CONSTRAINED] == 0 else 0.0
         if sizes[MOST_EVENTS] > 0 or sizes[WATCHES] > 0:
+            h[IS_EVALUATED] = 0.0
             levels_at(m, y1, after)
             end = note_events(m, t0, y0, f0, t1, y1, f1, before, after)
             stopped = end <= t1

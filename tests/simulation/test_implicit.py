@@ -58,7 +58,7 @@ def test_condensed_equations_are_those_of_all_states(case):
     room, f, c = np.zeros(condensation_room(1, int(s[MODEL.RESPONSES]))), np.zeros(len(y)), 2e-3
     rates = partial(rates_at, system)
     jacobian = np.column_stack([(rates(y + h) - rates(y - h)) / 2e-6 for h in 1e-6 * np.eye(len(y))])
-    assert linearise(system.program.ints, system.numbers, system._w, y, f, room) == OUTCOME.OK
+    assert linearise(system.program.ints, system.numbers, system._w, y, f, room, 0.0) == OUTCOME.OK
     assert condense(system.program.ints, c, room)
     right = np.random.default_rng(1).uniform(-1.0, 1.0, len(y))
     result = right.copy()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
+from inspect import signature
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from osimlite.kernels.condensation import WIDTH
@@ -87,24 +88,34 @@ class KernelText:
     def response_kernel(self) -> Callable[..., int]:
         """The function that applies 1 of a force along a displacement, and leaves its derivatives in SCRATCH.
 
-        A row for the force and for the rate of each state, see :mod:`osimlite.kernels.condensation`.
+        A row for the force and for the rate of each state, see :mod:`osimlite.kernels.condensation`. The moment is that
+        of the last evaluation, whose record tells what that has found.
         """
-        kind, outputs = self.kind, self.kind.outputs
+        kind, outputs, law = self.kind, self.kind.outputs, self.kind.law
         force, _ = kind.geometry.along
-        # A rate may have the name of an output of another meaning, such as that of a state.
-        lines = [f"{', '.join(f'{name}_0' for name in outputs)} = {self._call(self._arguments)}"]
-        changed = self._changed
-        for column, place in changed.items():
-            arguments = self._arguments
-            arguments[place] += f" + {SMALL_CHANGE}"
-            results = ", ".join(f"{name}_{column + 1}" for name in outputs)
-            lines.append(f"{results} = {self._call(arguments)}")
+        rows, changed = (force, *(state.rate for state in kind.states)), self._changed
+        if kind.slopes is not None and law is not None:
+            found = [name for name in signature(kind.slopes).parameters if name not in signature(law).parameters]
+            arguments = [*self._arguments, *(f"found[{kind.recorded[name]}]" for name in found)]
+            law, slopes = kind.slopes, [f"{name}_{column + 1}" for name in rows for column in changed]
+            lines = [f"{', '.join(slopes)} = {self._call(arguments)}"]
+            slope = "{0}_{1}"
+        else:
+            # A rate may have the name of an output of another meaning, such as that of a state.
+            lines = [f"{', '.join(f'{name}_0' for name in outputs)} = {self._call(self._arguments)}"]
+            for column, place in changed.items():
+                arguments = self._arguments
+                arguments[place] += f" + {SMALL_CHANGE}"
+                results = ", ".join(f"{name}_{column + 1}" for name in outputs)
+                lines.append(f"{results} = {self._call(arguments)}")
+            slope = f"({{0}}_{{1}} - {{0}}_0) / {SMALL_CHANGE}"
         lines += [f"{force} = 1.0", *kind.geometry.after, "change = at(w, WORK.SCRATCH)"]
-        for row, name in enumerate((force, *(state.rate for state in kind.states))):
+        for row, name in enumerate(rows):
             for column in range(WIDTH):
-                difference = f"({name}_{column + 1} - {name}_0) / {SMALL_CHANGE}" if column in changed else "0.0"
-                lines.append(f"change[{WIDTH * row + column}] = {difference}")
-        return self._function(RESPONSE, kind.law, lines)
+                value = slope.format(name, column + 1) if column in changed else "0.0"
+                lines.append(f"change[{WIDTH * row + column}] = {value}")
+        lines[:0] = *self._places_of_item, *(kind.geometry.again or kind.geometry.before)
+        return self._written(RESPONSE, "item", lines, law=law)
 
     @cached_property
     def abreast_kernel(self) -> Callable[..., int]:

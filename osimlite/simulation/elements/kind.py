@@ -84,6 +84,9 @@ class Kind:
     settled: tuple[str, ...] = ()  # names of the states that it finds
     # force (N) of fully active fibers along a rigid tendon, from what the law is given; of muscles
     rigid: Callable[..., float] | None = None
+    # derivatives of the force and of each rate by displacement, its speed and each state that the law is given, row
+    # by row, from what the law is given and what its other parameters name of the record; differences if None
+    slopes: Callable[..., Any] | None = None
     abreast: Abreast | None = None  # the law in parts, which several forces take together
     # what is said of a force whose law, or equilibrium, has no solution, from what is `known` of it
     told: Callable[[Mapping[str, float]], str] | None = None

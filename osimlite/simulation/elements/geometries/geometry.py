@@ -20,6 +20,7 @@ class Geometry:
     inputs: ClassVar[tuple[str, ...]] = ()  # what it computes for a law, in the code before the law is called
     speed: ClassVar[str] = ""  # name of the input with which an actuator's force, or its negative, makes a power
     before: ClassVar[tuple[str, ...]] = ()  # that code
+    again: ClassVar[tuple[str, ...]] = ()  # the same after an evaluation of the moment, if that is less
     # the output that pushes along one displacement, which is the first input, its speed the second; and 1 if it does
     # so, -1 if it pulls. Empty if there is no such thing.
     along: ClassVar[tuple[str, int]] = ("", 0)

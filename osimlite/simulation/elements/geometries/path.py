@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from osimlite.kernels.paths import path_length, pull_path
+from osimlite.kernels.paths import known_length, path_length, pull_path
 from osimlite.multibody.links import Places
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of, module_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
@@ -31,8 +31,9 @@ class AlongPath(Geometry):
         "if length != length:",
         "    return OUTCOME.UNSOLVED",
     )
+    again = ("length, rate = known_length(s, w, item - g[0])",)
     after = ("pull_path(s, x, w, y, f, item - g[0], tension)",)
-    calls = (path_length, pull_path)
+    calls = (path_length, known_length, pull_path)
 
     def read(self, builder: ElementBuilder, force: Any) -> Path:
         """The path of a force.

@@ -16,6 +16,7 @@ from osimlite.forces.millard2012_equilibrium import (
     millard2012_equilibrium,
     millard2012_equilibrium_length,
     millard2012_rigid,
+    millard2012_slopes,
     muscle_of,
 )
 from osimlite.forces.muscle_curves import (
@@ -142,6 +143,7 @@ KIND = muscle(
     equilibrium=millard2012_equilibrium_length,
     settled=("fiber_length",),
     rigid=millard2012_rigid,
+    slopes=millard2012_slopes,
     abreast=Abreast(
         Fibers,
         fibers_at,
