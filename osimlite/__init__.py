@@ -1,10 +1,10 @@
 """osimlite: build, check, translate and simulate OpenSim models without OpenSim.
 
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
-``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``inverse_kinematics``,
-``FrameSolver``, ``scale``, ``fit``, ``kinematics``, ``inverse_dynamics``, ``static_optimization``, ``casadi``,
-``linearize``, ``sensitivity``, ``modify``, ``run``, ``check_trial``, ``report``, the errors, and every component class
-under OpenSim's own name (``osimlite.PinJoint``).
+``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``Feedback``,
+``inverse_kinematics``, ``FrameSolver``, ``scale``, ``fit``, ``kinematics``, ``inverse_dynamics``,
+``static_optimization``, ``casadi``, ``linearize``, ``sensitivity``, ``modify``, ``run``, ``check_trial``, ``report``,
+the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``).
 Names are imported when first used, so that importing osimlite costs nothing.
 """
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from osimlite.lint import validate as validate
     from osimlite.modifying.words import modify as modify
     from osimlite.multibody import build_mechanism as mechanism
+    from osimlite.reflexes.feedback import Feedback as Feedback
     from osimlite.schema.model import Model as Model
     from osimlite.simulation import simulate as simulate
     from osimlite.simulation.muscle_curves import muscle_curves as muscle_curves
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
 
     # When the program runs, `__getattr__` makes the list, of the component classes too.
     __all__ = [
+        "Feedback",
         "FrameSolver",
         "Model",
         "OsimliteError",
@@ -88,6 +90,7 @@ _FUNCTIONS = {
     "write": "osimlite.document.printer",
     "to_text": "osimlite.document.printer",
     "validate": "osimlite.lint",
+    "Feedback": "osimlite.reflexes.feedback",
     "FrameSolver": "osimlite.fitting.frame_solver",
     "inverse_kinematics": "osimlite.fitting.inverse_kinematics",
     "fit": "osimlite.fitting.person",

@@ -29,7 +29,7 @@ from osimlite.simulation.trajectory import Trajectory
 from osimlite.sweep.properties import places
 from osimlite.text import did_you_mean
 
-CHOICES = {*PER_RUN, "folder"} - {"fixed_step", "integrator"}
+CHOICES = {*PER_RUN, "folder"} - {"fixed_step", "integrator", "controller", "resume"}
 """Options of `simulate` that leave the motion one of the functions of CasADi, in steps of Merson's method."""
 ACCURACY = 1e-6
 """That is taken where none is chosen."""

@@ -76,6 +76,15 @@ Controls = Annotated[
         show_default=False,
     ),
 ]
+Par = Annotated[
+    Path | None,
+    Option(
+        "--par",
+        metavar="FILE",
+        help="Values of the parameters of reflexes (.par).",
+        show_default="those that their file begins with",
+    ),
+]
 Numbers = Annotated[str, Option(help="'shortest' digits that read back equal, or 'opensim' for 17 digits.")]
 Format = Annotated[str, Option("--format", metavar="FORMAT", help="full, concise, json, github, sarif or junit.")]
 Select = Annotated[

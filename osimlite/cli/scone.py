@@ -5,7 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+from osimlite.cli import _options as options
 from osimlite.cli._command import Argument, Option, command
+
+UNITS = {"speed": "m/s", "power": "W/kg", "transport": "J/(kg m)"}
+"""Of what measures report."""
 
 
 @command
@@ -18,15 +22,7 @@ def scone(
             show_default=False,
         ),
     ],
-    par: Annotated[
-        Path | None,
-        Option(
-            "--par",
-            metavar="FILE",
-            help="Parameters (.par) to walk with.",
-            show_default="those that the scenario begins with",
-        ),
-    ] = None,
+    par: options.Par = None,
     optimize: Annotated[bool, Option("--optimize", help="Look for better ones.")] = False,
     generations: Annotated[
         int | None, Option(metavar="N", help="How many.", show_default="what the scenario says, or 1000")
@@ -59,6 +55,7 @@ def scone(
     from osimlite.errors import SettingError
     from osimlite.files import make_folder
     from osimlite.models.walking import SCENARIO, write_scenario
+    from osimlite.reflexes.gait import gait_of
     from osimlite.reflexes.parameters import read_par
     from osimlite.reflexes.scenario import Scenario
     from osimlite.reflexes.search import BEST, search
@@ -87,6 +84,9 @@ def scone(
     for name, term in walked.terms.items():
         facts.add(name, f"{term[0]:.6g}")
     for name, report in walked.report.items():
-        facts.add(name, f"{report[0]:.6g}")
+        facts.add(name, f"{report[0]:.6g} {UNITS.get(name, '')}".rstrip())
+    gait = gait_of(given, walked)
+    for name, words in () if gait is None else gait.told().items():
+        facts.add(name, words)
     facts.add("files", ", ".join(map(str, files)))
     facts.show()

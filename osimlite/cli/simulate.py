@@ -32,6 +32,16 @@ def simulate(
             metavar="FILE", help="Start from the last row of a file of states; --set says more.", show_default=False
         ),
     ] = None,
+    controller: Annotated[
+        Path | None,
+        Option(
+            "--controller",
+            metavar="FILE",
+            help="Reflexes that drive actuators: a file of a controller or a scenario, .yaml or .scone.",
+            show_default=False,
+        ),
+    ] = None,
+    par: options.Par = None,
     output: options.Folder = None,
     plot: Annotated[
         bool, Option("--plot", help="Draw coordinates, muscles, forces, probes and energy as PNG.")
@@ -58,13 +68,20 @@ def simulate(
     """
     from osimlite._require import require
     from osimlite.document.reader import read
-    from osimlite.errors import SimulationError
+    from osimlite.errors import SettingError, SimulationError
 
     if plot:
         require("matplotlib", extra="plot", purpose="drawing")
     if animate:
         require("PIL", extra="view", purpose="an animation")
+    if par is not None and controller is None:
+        raise SettingError("--par has values for a controller; give that by --controller")
     model = read(file)
+    feedback = None
+    if controller is not None:
+        from osimlite.reflexes.feedback import Feedback
+
+        feedback = Feedback(controller, {} if par is None else par)
     if controls:
         from osimlite.simulation.given_controls import words_to_controls
     from osimlite.simulation.run import Simulation
@@ -89,6 +106,7 @@ def simulate(
                     initial=initial,
                     initial_speeds=speeds,
                     controls=words_to_controls(controls) if controls else None,
+                    controller=feedback,
                     progress=progress,
                 )
         except (Interrupted, SimulationError) as stopped:
@@ -118,7 +136,7 @@ def simulate(
 
 
 SOME = {
-    *("probes.sto", "animation.gif"),
+    *("probes.sto", "controller.sto", "animation.gif"),
     *("coordinates.png", "states.png", "contact_forces.png", "other_forces.png", "probes.png", "energy.png"),
 }
 """What not every simulation writes: --plot and --animate draw pictures."""

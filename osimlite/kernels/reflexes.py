@@ -3,11 +3,13 @@
 The integers are a head, `REFLEXES`; of each term `TERM`; of each gate the sensors of a coordinate and of its speed. The
 numbers of a candidate are a head, `LIMITS`, in which each leg has its own; of each term delay, gain and offset; of each
 gate delay, least and largest value. Delays are in control steps.
+
+Noise is drawn anew at each control step, from a seed, the number of the step and that of what is noisy alone.
 """
 
 from __future__ import annotations
 
-from math import floor
+from math import cos, floor, log, pi, sqrt
 
 from osimlite.kernels.layout import Record
 from osimlite.kernels.pointers import Floats, Ints, at
@@ -26,12 +28,17 @@ OF_EACH = 3
 NEAR = 1e-9
 """A delay of whole control steps is one, whatever it was divided to."""
 
+OF_CONTROLS, OF_SENSORS = 0, 1
+"""Noise that is apart."""
+WORD = 0xFFFFFFFF
+
 
 class REFLEXES(metaclass=Record):
     """Counts of terms and gates, how many control steps and sensors are remembered, whether legs have states, whether
-    these go from stance to swing at once; how many numbers, and how much room, each candidate has."""
+    these go from stance to swing at once; how many numbers, and how much room, each candidate has; number of the first
+    control step that is recorded, and of rows of the record; whether there is noise."""
 
-    TERMS, GATES, KEPT, SENSORS, HAS_STATES, SWINGS_FROM_STANCE, NUMBERS, ROOM, HEAD = range(9)
+    TERMS, GATES, KEPT, SENSORS, HAS_STATES, SWINGS_FROM_STANCE, NUMBERS, ROOM, FIRST, ROWS, IS_NOISY, HEAD = range(12)
 
 
 class TERM(metaclass=Record):
@@ -43,15 +50,33 @@ class TERM(metaclass=Record):
 
 class LIMITS(metaclass=Record):
     """Delay of the loads; of each leg the loads with which it stands and swings, and how far the foot is ahead in late
-    stance, at liftoff and at landing, m."""
+    stance, at liftoff and at landing, m; a seed, and standard deviations of the noise of controls and of sensors: at
+    least, and as part of what is noisy."""
 
     DELAY, STANDS, SWINGS, LATE, LEAVES, LANDS, OF_LEG = 0, 0, 1, 2, 3, 4, 5
-    HEAD = 1 + 2 * OF_LEG
+    SEED = 1 + 2 * OF_LEG
+    CONTROL_NOISE, CONTROL_PART, SENSOR_NOISE, SENSOR_PART, HEAD = range(SEED + 1, SEED + 6)
 
 
-def note_senses(i: Ints, frames: int, row: Floats, history: Floats) -> None:
+def note_senses(i: Ints, p: Floats, frames: int, row: Floats, history: Floats) -> None:
     """Remember what is felt after so many rows."""
-    copy(i[REFLEXES.SENSORS], row, at(history, i[REFLEXES.SENSORS] * (frames % i[REFLEXES.KEPT])))
+    sensors = i[REFLEXES.SENSORS]
+    kept = at(history, sensors * (frames % i[REFLEXES.KEPT]))
+    copy(sensors, row, kept)
+    if i[REFLEXES.IS_NOISY] > 0:
+        for k in range(sensors):
+            width = p[LIMITS.SENSOR_NOISE] + p[LIMITS.SENSOR_PART] * abs(kept[k])
+            if width > 0.0:
+                kept[k] += width * normal(int(p[LIMITS.SEED]), OF_SENSORS, frames, k)
+
+
+def add_noise(i: Ints, p: Floats, step: int, count: int, controls: Floats) -> None:
+    """Add noise to controls at a control step, as SCONE's NoiseController does."""
+    if i[REFLEXES.IS_NOISY] > 0:
+        for k in range(count):
+            width = p[LIMITS.CONTROL_NOISE] + p[LIMITS.CONTROL_PART] * controls[k]
+            if width > 0.0:
+                controls[k] += width * normal(int(p[LIMITS.SEED]), OF_CONTROLS, step, k)
 
 
 def felt_before(i: Ints, frames: int, history: Floats, sensor: int, delay: float) -> float:
@@ -140,3 +165,24 @@ def is_closed(i: Ints, gate: Ints, own: Floats, frames: int, history: Floats) ->
     value = felt_before(i, frames, history, gate[0], own[0])
     speed = felt_before(i, frames, history, gate[1], own[0])
     return (value < own[1] and speed < 0.0) or (value > own[2] and speed >= 0.0)
+
+
+def normal(seed: int, what: int, step: int, number: int) -> float:
+    """A number of a normal distribution of mean 0 and deviation 1, by the method of Box and Muller."""
+    one, two = philox(int(step) & WORD, int(number), what, 0, seed & WORD, (seed >> 32) & WORD)
+    return sqrt(-2.0 * log((one + 1.0) / (WORD + 1.0))) * cos(2.0 * pi * two / (WORD + 1.0))
+
+
+def philox(a: int, b: int, c: int, d: int, key: int, other: int) -> tuple[int, int]:
+    """The first two words of Philox4x32-10 (J. K. Salmon et al., Parallel random numbers: as easy as 1, 2, 3, SC 2011).
+
+    Args:
+        a, b, c, d: words of the counter.
+        key, other: of the key.
+    """
+    for _ in range(10):
+        one, two = 0xD2511F53 * a, 0xCD9E8D57 * c
+        a, b = ((two >> 32) & WORD) ^ b ^ key, two & WORD
+        c, d = ((one >> 32) & WORD) ^ d ^ other, one & WORD
+        key, other = (key + 0x9E3779B9) & WORD, (other + 0xBB67AE85) & WORD
+    return a, b

@@ -23,6 +23,7 @@ from osimlite.kernels.method import (
 from osimlite.kernels.pointers import Floats, Ints, at, call
 from osimlite.kernels.record import (
     ATTEMPTED,
+    COUNTED,
     DONE,
     EVALUATIONS,
     EVENT,
@@ -80,26 +81,50 @@ def run_several(
     Args: as of `Motion`, one row for each run; a log, `w` and what tells how to run serve them all. `each` is the
     length of a row of numbers, 0 if one serves them all.
     """
-    size, pairs = s[MODEL.STATE_SIZE], s[MODEL.CONTACTS]
     for k in range(first, last):
-        m = Motion(
-            s,
-            at(x, each * k),
-            w,
-            sizes,
-            at(clocks, 2 * k),
-            at(counts, 6 * k),
-            times,
-            at(reports, k * sizes[TIMES] * size),
-            log,
-            forces,
-            at(events, sizes[EVENT] * k * sizes[MOST_EVENTS]),
-            at(peaks, 2 * k * pairs),
-            watches,
-            levels,
-        )
-        endings[k] = run(m, at(states, k * size), False)
+        m = run_of(s, x, w, each, sizes, clocks, counts, states, times, reports, log, forces, events, peaks, watches,
+                   levels, k)  # fmt: skip
+        endings[k] = run(m, at(states, k * s[MODEL.STATE_SIZE]), False)
     return OUTCOME.OK
+
+
+def run_of(
+    s: Ints,
+    x: Floats,
+    w: Floats,
+    each: int,
+    sizes: Ints,
+    clocks: Floats,
+    counts: Ints,
+    states: Floats,
+    times: Floats,
+    reports: Floats,
+    log: Floats,
+    forces: Floats,
+    events: Floats,
+    peaks: Floats,
+    watches: Ints,
+    levels: Floats,
+    k: int,
+) -> Motion:
+    """One of several runs."""
+    size, pairs = s[MODEL.STATE_SIZE], s[MODEL.CONTACTS]
+    return Motion(
+        s,
+        at(x, each * k),
+        w,
+        sizes,
+        at(clocks, 2 * k),
+        at(counts, COUNTED * k),
+        times,
+        at(reports, k * sizes[TIMES] * size),
+        log,
+        forces,
+        at(events, sizes[EVENT] * k * sizes[MOST_EVENTS]),
+        at(peaks, 2 * k * pairs),
+        watches,
+        levels,
+    )
 
 
 def run(m: Motion, y: Floats, is_going: bool) -> int:

@@ -3,8 +3,8 @@
 The plan of a row are integers: a head, `SENSES`; of each muscle where w has what `OF_MUSCLES` names; of each force that
 limits a coordinate the number of that and where w has the force; the link of each body; of each leg the numbers of the
 bodies that it hangs on and ends with, and the first and the end of the contacts of its foot. The numbers that belong to
-it are a head, `SENSED`; optimal fiber lengths (m), strengths (N), least excitations; mass centres in the links (m),
-masses (kg).
+it are a head, `SENSED`; optimal fiber lengths (m), strengths (N); of each control the least and the largest; mass
+centres in the links (m), masses (kg).
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ OF_LEG = 4
 
 
 class SENSES(metaclass=Record):
-    """Counts, and where a row has what is felt: lengths of fibers over the optimal ones, velocities (of these lengths
-    per s), forces of tendons over the strengths, values of coordinates and their speeds, forces of the ground on each
-    leg over the weight; active forces of fibers (N), forces that limit coordinates (N, N m), mass centres of bodies and
-    the common one (m)."""
+    """Counts, of controls and of the numbers too, and where a row has what is felt: lengths of fibers over the optimal
+    ones, velocities (of these lengths per s), forces of tendons over the strengths, values of coordinates and their
+    speeds, forces of the ground on each leg over the weight; active forces of fibers (N), forces that limit coordinates
+    (N, N m), mass centres of bodies and the common one (m)."""
 
-    MUSCLES, COORDINATES, LEGS, LIMITS, BODIES = range(5)
-    LENGTHS, VELOCITIES, FORCES, VALUES, SPEEDS, LOADS, ACTIVE, MOMENTS, PLACES, CENTRE, SIZE, HEAD = range(5, 17)
+    MUSCLES, COORDINATES, LEGS, LIMITS, BODIES, CONTROLS, KNOWN = range(7)
+    LENGTHS, VELOCITIES, FORCES, VALUES, SPEEDS, LOADS, ACTIVE, MOMENTS, PLACES, CENTRE, SIZE, HEAD = range(7, 19)
 
 
 class SENSED(metaclass=Record):
@@ -52,7 +52,8 @@ def feel(s: Ints, w: Floats, y: Floats, i: Ints, p: Floats, row: Floats) -> None
         moments[k] = 0.0
     for k in range(i[SENSES.LIMITS]):
         moments[limits[2 * k]] = w[limits[2 * k + 1]]
-    links, centres, total = at(limits, 2 * i[SENSES.LIMITS]), at(strengths, 2 * muscles), ZERO
+    links, total = at(limits, 2 * i[SENSES.LIMITS]), ZERO
+    centres = at(strengths, muscles + 2 * i[SENSES.CONTROLS])
     for k in range(bodies):
         place = station(s, w, links[k], vector(centres, 3 * k))
         put(row, i[SENSES.PLACES] + 3 * k, place)

@@ -14,6 +14,7 @@ LAW_MODULES = {
     "evaluate": "dynamics",
     "equilibrate": "dynamics",
     "run_several": "runs",
+    "run_by_reflexes": "walks",
     "hold_several": "walks",
     "walk_several": "walks",
     "merson": "merson",

@@ -1,6 +1,7 @@
-"""Motions of copies whose controls are held for a step, and whole walks in one call.
+"""Motions whose controls are held for a step, and whole walks in one call.
 
-A walk are control steps of reflexes, the motion between, what is felt, and how it is judged.
+A walk are control steps of reflexes, the motion between, what is felt, and how it is judged. Any other run can go by
+reflexes, too: what they know of what was is a room of its own, from which a run goes on.
 """
 
 from __future__ import annotations
@@ -9,11 +10,19 @@ from typing import NamedTuple
 
 from osimlite.kernels.criteria import begin_criteria, judged
 from osimlite.kernels.layout import MODEL, OUTCOME, STAGE
-from osimlite.kernels.method import HAS_DERIVATIVE
+from osimlite.kernels.method import HAS_DERIVATIVE, LAST_TIME, MEMORY
 from osimlite.kernels.pointers import Floats, Ints, at
-from osimlite.kernels.record import COUNTED, DONE, EVALUATIONS, METHOD_AT, Motion, evaluated
-from osimlite.kernels.reflexes import EARLY_STANCE, REFLEXES, UNKNOWN, add_reflexes, go_on, note_senses
-from osimlite.kernels.runs import run
+from osimlite.kernels.record import COUNTED, DONE, EVALUATIONS, FAILED, METHOD_AT, Motion, evaluated
+from osimlite.kernels.reflexes import (
+    EARLY_STANCE,
+    REFLEXES,
+    UNKNOWN,
+    add_noise,
+    add_reflexes,
+    go_on,
+    note_senses,
+)
+from osimlite.kernels.runs import run, run_of
 from osimlite.kernels.senses import SENSED, SENSES, feel
 from osimlite.kernels.states import copy, is_finite
 
@@ -32,15 +41,15 @@ class Walk(NamedTuple):
     m: Motion
     senses: Ints  # see `senses`
     known: Floats
-    muscles: Ints  # where the numbers of the model have each control; where a state has each activation (2, m)
+    driven: Ints  # where the numbers of the model have each control (c,); where a state has each activation (m,)
     plan: Ints  # see `reflexes`
     numbers: Floats
     criteria: Ints  # see `criteria`
     bounds: Floats
     room: Floats  # see LEGS
     row: Floats  # what is felt
-    excitations: Floats  # that are held (m,)
-    record: Floats  # of each control step the state at its start, excitations, loads
+    excitations: Floats  # that are held (c,)
+    record: Floats  # of each control step the state at its start, excitations, loads; of other runs see `decide`
     progress: Ints  # see STEPS
 
 
@@ -101,7 +110,7 @@ def walk_several(
     peaks: Floats,
     senses: Ints,
     known: Floats,
-    muscles: Ints,
+    driven: Ints,
     plan: Ints,
     numbers: Floats,
     criteria: Ints,
@@ -129,14 +138,14 @@ def walk_several(
             m,
             senses,
             known,
-            muscles,
+            driven,
             plan,
             at(numbers, plan[REFLEXES.NUMBERS] * k),
             criteria,
             bounds,
             at(room, plan[REFLEXES.ROOM] * k),
             at(rows, senses[SENSES.SIZE] * k),
-            at(excitations, senses[SENSES.MUSCLES] * k),
+            at(excitations, senses[SENSES.CONTROLS] * k),
             record,
             at(progress, COUNTS * k),
         )
@@ -151,8 +160,8 @@ def walk_several(
 def begun(a: Walk, y: Floats, order: int) -> int:
     """Feel what is at a state, and begin what is to begin."""
     m = a.m
-    for k in range(a.senses[SENSES.MUSCLES]):
-        m.x[a.muscles[k]] = 0.0
+    for k in range(a.senses[SENSES.CONTROLS]):
+        m.x[a.driven[k]] = 0.0
     status = evaluated(m, 0.0, y, at(m.w, m.s[MODEL.WORK_STATE]), STAGE.FORCE)
     if status != OUTCOME.OK:
         return status
@@ -161,7 +170,7 @@ def begun(a: Walk, y: Floats, order: int) -> int:
         for k in range(LEGS):
             a.room[k] = UNKNOWN if a.plan[REFLEXES.HAS_STATES] > 0 else EARLY_STANCE
         a.progress[STEPS], a.progress[FRAMES], a.progress[GOING], a.progress[FORCES] = 0, 1, 1, 0
-        note_senses(a.plan, 0, a.row, at(a.room, LEGS))
+        note_senses(a.plan, a.numbers, 0, a.row, at(a.room, LEGS))
         excite(a)
     elif order == START:
         begin_criteria(a.senses, a.criteria, a.row, judged_room(a))
@@ -174,7 +183,7 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
     As in SCONE each can begin with the derivative that the one before has ended with, which knows its excitations only.
     """
     m, progress, lags = a.m, a.progress, a.known[SENSED.LAGS] > 0.0
-    size, muscles = m.s[MODEL.STATE_SIZE], a.senses[SENSES.MUSCLES]
+    size, controls = m.s[MODEL.STATE_SIZE], a.senses[SENSES.CONTROLS]
     if lags:
         hold(a)
         before = at(m.w, m.s[MODEL.WORK_STATE])
@@ -185,10 +194,10 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
             return
         excite(a)
         if is_recorded:
-            record = at(a.record, (size + muscles + a.senses[SENSES.LEGS]) * number)
+            record = at(a.record, (size + controls + a.senses[SENSES.LEGS]) * number)
             copy(size, y, record)
-            copy(muscles, a.excitations, at(record, size))
-            copy(a.senses[SENSES.LEGS], at(a.row, a.senses[SENSES.LOADS]), at(record, size + muscles))
+            copy(controls, a.excitations, at(record, size))
+            copy(a.senses[SENSES.LEGS], at(a.row, a.senses[SENSES.LOADS]), at(record, size + controls))
         hold(a)
         goes_on = held(m, y, lags)
         progress[STEPS] += 1
@@ -200,10 +209,10 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
             # The method has not looked at the forces at the end.
             evaluated(m, m.clock[0], y, at(m.w, m.s[MODEL.WORK_STATE]), STAGE.FORCE)
         feel(m.s, m.w, y, a.senses, a.known, a.row)
-        note_senses(a.plan, progress[FRAMES], a.row, at(a.room, LEGS))
+        note_senses(a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
         progress[FRAMES] += 1
         t = progress[STEPS] * a.known[SENSED.STEP]
-        active = at(a.muscles, muscles)
+        active = at(a.driven, controls)
         if judged(
             a.senses, a.known, a.criteria, a.bounds, t, a.row, active, y, a.excitations, judged_room(a)
         ):  # fmt: skip
@@ -211,9 +220,9 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
 
 
 def hold(a: Walk) -> None:
-    """Give the muscles the excitations."""
-    for k in range(a.senses[SENSES.MUSCLES]):
-        a.m.x[a.muscles[k]] = a.excitations[k]
+    """Give the actuators their controls."""
+    for k in range(a.senses[SENSES.CONTROLS]):
+        a.m.x[a.driven[k]] = a.excitations[k]
 
 
 def judged_room(a: Walk) -> Floats:
@@ -222,13 +231,121 @@ def judged_room(a: Walk) -> Floats:
 
 
 def excite(a: Walk) -> None:
-    """What reflexes excite the muscles by, within bounds; the states of the legs go on."""
-    history, frames, count = at(a.room, LEGS), a.progress[FRAMES], a.senses[SENSES.MUSCLES]
+    """What reflexes drive the actuators by, within bounds; the states of the legs go on."""
+    history, frames, count = at(a.room, LEGS), a.progress[FRAMES], a.senses[SENSES.CONTROLS]
     if a.plan[REFLEXES.HAS_STATES] > 0:
         go_on(a.senses, a.plan, a.numbers, frames, a.row, history, a.room)
     for k in range(count):
         a.excitations[k] = 0.0
     add_reflexes(a.plan, a.numbers, frames, history, a.room, a.excitations)
-    least = at(a.known, SENSED.HEAD + 2 * count)
+    add_noise(a.plan, a.numbers, a.progress[STEPS], count, a.excitations)
+    least = at(a.known, SENSED.HEAD + 2 * a.senses[SENSES.MUSCLES])
+    most = at(least, count)
     for k in range(count):
-        a.excitations[k] = min(max(a.excitations[k], least[k]), 1.0)
+        a.excitations[k] = min(max(a.excitations[k], least[k]), most[k])
+
+
+def run_by_reflexes(
+    s: Ints,
+    x: Floats,
+    w: Floats,
+    each: int,
+    sizes: Ints,
+    clocks: Floats,
+    counts: Ints,
+    states: Floats,
+    times: Floats,
+    reports: Floats,
+    log: Floats,
+    forces: Floats,
+    events: Floats,
+    peaks: Floats,
+    watches: Ints,
+    levels: Floats,
+    endings: Ints,
+    senses: Ints,
+    known: Floats,
+    driven: Ints,
+    plan: Ints,
+    numbers: Floats,
+    room: Floats,
+    rows: Floats,
+    excitations: Floats,
+    record: Floats,
+    progress: Ints,
+    first: int,
+    last: int,
+) -> int:
+    """The runs `first` to `last` - 1, as `run_several` computes them, each by reflexes of its own.
+
+    Args: as of `run_several`, and of `Walk`: one row for each run.
+    """
+    for k in range(first, last):
+        m = run_of(s, x, w, each, sizes, clocks, counts, states, times, reports, log, forces, events, peaks, watches,
+                   levels, k)  # fmt: skip
+        walk = Walk(
+            m,
+            senses,
+            at(known, senses[SENSES.KNOWN] * k),
+            driven,
+            plan,
+            at(numbers, plan[REFLEXES.NUMBERS] * k),
+            plan,
+            numbers,
+            at(room, plan[REFLEXES.ROOM] * k),
+            at(rows, senses[SENSES.SIZE] * k),
+            at(excitations, senses[SENSES.CONTROLS] * k),
+            at(record, plan[REFLEXES.ROWS] * k * decided_size(senses, plan)),
+            at(progress, COUNTS * k),
+        )
+        endings[k] = run_on(walk, at(states, k * s[MODEL.STATE_SIZE]))
+    return OUTCOME.OK
+
+
+def decided_size(senses: Ints, plan: Ints) -> int:
+    """How many numbers are recorded of a control step."""
+    return int(plan[REFLEXES.SENSORS] + LEGS + senses[SENSES.CONTROLS] + 1)
+
+
+def run_on(a: Walk, y: Floats) -> int:
+    """Go on from the state y, as `run` does, with controls that are new at each control step, also at the very end."""
+    m, progress = a.m, a.progress
+    h = at(m.w, m.sizes[METHOD_AT])
+    end, ending = h[LAST_TIME], DONE
+    while ending == DONE:
+        if m.clock[0] >= progress[STEPS] * a.known[SENSED.STEP] and not decide(a, y):
+            ending = FAILED
+        elif m.clock[0] >= end:
+            break
+        else:
+            hold(a)
+            h[LAST_TIME] = min(progress[STEPS] * a.known[SENSED.STEP], end)
+            ending = run(m, y, False)
+    h[LAST_TIME] = end
+    return ending
+
+
+def decide(a: Walk, y: Floats) -> bool:
+    """Begin a control step, and record it: what sensors were remembered, states of the legs, controls, and the step
+    that the method would try next; whether the forces could be computed."""
+    m, progress, sensors = a.m, a.progress, a.plan[REFLEXES.SENSORS]
+    # No method knows what was, as the motion has a kink here.
+    at(m.w, m.sizes[METHOD_AT])[MEMORY] = 0.0
+    hold(a)
+    m.counts[EVALUATIONS] += 1
+    if evaluated(m, m.clock[0], y, at(m.w, m.s[MODEL.WORK_STATE]), STAGE.FORCE) != OUTCOME.OK:
+        return False
+    feel(m.s, m.w, y, a.senses, a.known, a.row)
+    note_senses(a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
+    progress[FRAMES] += 1
+    excite(a)
+    row = progress[STEPS] - a.plan[REFLEXES.FIRST]
+    if row < a.plan[REFLEXES.ROWS]:
+        record = at(a.record, row * decided_size(a.senses, a.plan))
+        kept = sensors * ((progress[FRAMES] - 1) % a.plan[REFLEXES.KEPT])
+        copy(sensors, at(a.room, LEGS + kept), record)
+        copy(LEGS, a.room, at(record, sensors))
+        copy(a.senses[SENSES.CONTROLS], a.excitations, at(record, sensors + LEGS))
+        record[decided_size(a.senses, a.plan) - 1] = m.clock[1]
+    progress[STEPS] += 1
+    return True

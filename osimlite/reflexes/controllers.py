@@ -1,4 +1,4 @@
-"""Reflexes of muscles and coordinates, on while a leg is in some state: SCONE's GaitStateController.
+"""Reflexes of muscles and coordinates, on while a leg is in some state: SCONE's GaitStateController; noise.
 
 All reflexes are sums of terms ``gain * (sensor - offset)`` with a delay, which the kernels add.
 """
@@ -10,16 +10,20 @@ from typing import NamedTuple
 import numpy as np
 
 from osimlite.kernels.pointers import Ints
-from osimlite.kernels.reflexes import FREE, LIMITS, OF_RESULT, OF_SENSOR, TERM
+from osimlite.kernels.reflexes import FREE, LIMITS, OF_RESULT, OF_SENSOR, REFLEXES, TERM
+from osimlite.kernels.senses import SENSES
+from osimlite.kernels.walks import LEGS
 from osimlite.multibody.spatial import Array
+from osimlite.quantity import tell
 from osimlite.reflexes.parameters import Parameters
 from osimlite.reflexes.settings import Node
-from osimlite.reflexes.walkers import SIDES, Walkers
+from osimlite.reflexes.walkers import SIDES, Felt
 from osimlite.text import or_known
 
 STATES = "EarlyStance", "LateStance", "Liftoff", "Swing", "Landing"
-CONTROLLERS = "GaitStateController", "ReflexController"
-"""What is done here."""
+COMPOSITE, NOISE = "CompositeController", "NoiseController"
+CONTROLLERS = "GaitStateController", "ReflexController", COMPOSITE
+"""What is done here, and besides noise within a CompositeController."""
 KINDS = "MuscleReflex", "ConditionalMuscleReflex", "DofReflex"
 """Of reflexes."""
 NEVER = -1.0
@@ -36,7 +40,7 @@ class Part(NamedTuple):
 
 
 class Reflexes:
-    """The reflexes of a GaitStateController, whose legs are in one of five states, or of a ReflexController alone.
+    """Reflexes whose legs are in one of five states (GaitStateController), reflexes alone, both, and noise.
 
     Args:
         node: of the controller.
@@ -44,24 +48,51 @@ class Reflexes:
         walkers: that it moves.
         parameters: of the candidates.
 
+    Attributes:
+        terms: of all reflexes.
+
     Raises:
         DocumentError: it has a part that is not done here; its name and line are told.
     """
 
-    def __init__(self, node: Node, kind: str, walkers: Walkers, parameters: Parameters) -> None:
-        self.walkers, self.node = walkers, node
-        self._terms: list[Part] = []
+    def __init__(self, node: Node, kind: str, walkers: Felt, parameters: Parameters) -> None:
+        self.walkers = walkers
+        self.terms: list[Part] = []
         self._gates: list[Part] = []
         self._limits, self._swings_from_stance = np.zeros((walkers.count, LIMITS.HEAD)), False
-        self._has_states, self._is_sided = kind == "GaitStateController", True
-        if self._has_states:
-            walkers.expect_legs()
-            self._read_states(node, parameters)
-        else:
-            self.symmetric = node.flag("symmetric", False)
-            self._is_sided = node.flag("dual_sided", True)
-            for leg in (0, 1) if self._is_sided else (0,):
-                self._add_reflexes(node, parameters, "", leg, (1 << len(STATES)) - 1)
+        self._has_states = self._is_noisy = False
+        parts = [(kind, node)]
+        if kind == COMPOSITE:
+            parts = [*node.all_of(*CONTROLLERS[:-1]), *node.all_of(NOISE)]
+            node.get("name")
+            node.expect_all_asked(f"a {COMPOSITE}", (*CONTROLLERS[:-1], NOISE))
+        for name, part in parts:
+            if name == NOISE:
+                self._read_noise(part)
+            elif name == "ReflexController":
+                self.symmetric, self._is_sided = part.flag("symmetric", False), part.flag("dual_sided", True)
+                part.get("name")
+                for leg in (0, 1) if self._is_sided else (0,):
+                    self._add_reflexes(part, parameters, "", leg, (1 << len(STATES)) - 1)
+            elif self._has_states:
+                raise part.error("legs are in the states of one GaitStateController, and this is another one")
+            else:
+                self._has_states = self._is_sided = True
+                walkers.expect_legs()
+                self._read_states(part, parameters)
+
+    def _read_noise(self, node: Node) -> None:
+        """SCONE's noise of the controls; that of the sensors is ours."""
+        if self._is_noisy:
+            raise node.error(f"there is a {NOISE} already")
+        self._is_noisy, noise = True, self._limits[:, LIMITS.SEED :]
+        noise[:, 0] = node.number("random_seed", 123)
+        for place, key in enumerate(("base_noise", "proportional_noise", "sensor_noise", "proportional_sensor_noise")):
+            noise[:, 1 + place] = node.number(key, 0.0)
+        node.get("name")
+        node.expect_all_asked(f"a {NOISE}")
+        if node.file.endswith(".scone"):
+            tell("noise is as large as SCONE's, but not the same: its numbers depend on the compiler of SCONE")
 
     def _read_states(self, node: Node, parameters: Parameters) -> None:
         parameters.auto = node.number("auto_std_factor", parameters.auto)
@@ -162,7 +193,7 @@ class Reflexes:
         self, node: Node, parameters: Parameters, prefix: str, leg: int, states: int, symmetric: bool
     ) -> None:
         target, source, before = self._begin(node, prefix, leg, symmetric)
-        number = self._named(node, source, self.walkers.names, leg)
+        number = self._named(node, source, self.walkers.names[: len(self.walkers.muscles)], leg)
         delay = self._delay(node, parameters, before)
         gate = self._gate(node, parameters, before, leg)
         for kind, rest, negative in (("L", 1.0, True), ("V", 0.0, False), ("F", 0.0, True)):
@@ -172,7 +203,7 @@ class Reflexes:
             if np.any(gain != 0.0):
                 sensor = self.walkers.sensor(kind, number)
                 term = target, sensor, FREE if free else OF_SENSOR, leg, states, gate
-                self._terms.append(Part(term, delay, gain, offset))
+                self.terms.append(Part(term, delay, gain, offset))
         self._constant(node, parameters, before, target, leg, states)
 
     def _gate(self, node: Node, parameters: Parameters, before: str, leg: int) -> int:
@@ -208,24 +239,30 @@ class Reflexes:
             if np.any(gain != 0.0):
                 place = self.walkers.sensor(sensor, number)
                 term = target, place, FREE if free else OF_RESULT, leg, states, -1
-                self._terms.append(Part(term, delay, -gain, offset))
+                self.terms.append(Part(term, delay, -gain, offset))
         self._constant(node, parameters, before, target, leg, states)
 
     def _constant(self, node: Node, parameters: Parameters, before: str, target: int, leg: int, states: int) -> None:
         constant = parameters.of(node, "C0", 0.0, f"{before}C0")
         if np.any(constant != 0.0):
             zero = np.zeros_like(constant)
-            self._terms.append(Part((target, -1, FREE, leg, states, -1), zero, constant, zero))
+            self.terms.append(Part((target, -1, FREE, leg, states, -1), zero, constant, zero))
 
     def compiled(self) -> tuple[Ints, Array]:
         """What the kernels go by (see :mod:`osimlite.kernels.reflexes`): integers, and of each candidate the
         numbers (w, r)."""
         # What goes by sensors is added first.
-        parts = [*sorted(self._terms, key=lambda term: term.ints[TERM.SENSOR] < 0), *self._gates]
+        parts = [*sorted(self.terms, key=lambda term: term.ints[TERM.SENSOR] < 0), *self._gates]
         delays = [part.delay / self.walkers.step for part in parts]
         each = [(delay, part.first, part.second) for delay, part in zip(delays, parts, strict=True)]
         numbers = np.column_stack([self._limits, *(column for columns in each for column in columns)])
         kept = int(np.ceil(max([*map(np.max, delays), self._limits[0, LIMITS.DELAY]]))) + 2
-        head = len(self._terms), len(self._gates), kept, 0, self._has_states, self._swings_from_stance, 0, 0
-        ints = np.array([*head, *(number for part in parts for number in part.ints)], dtype=np.int64)
-        return ints, np.ascontiguousarray(numbers)
+        sensors = int(self.walkers.senses[SENSES.ACTIVE])
+        head = np.zeros(REFLEXES.HEAD, dtype=np.int64)
+        head[: REFLEXES.ROOM + 1] = (
+            *(len(self.terms), len(self._gates), kept, sensors, self._has_states, self._swings_from_stance),
+            *(numbers.shape[1], LEGS + kept * sensors),
+        )
+        head[REFLEXES.IS_NOISY] = self._is_noisy
+        ints = [*head.tolist(), *(number for part in parts for number in part.ints)]
+        return np.array(ints, dtype=np.int64), np.ascontiguousarray(numbers)

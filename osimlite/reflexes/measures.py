@@ -83,7 +83,7 @@ class Measure(ABC):
     Attributes:
         name: of it.
         start, stop: between which it is on, s.
-        report: what it says besides.
+        report: what it says besides; of efforts by power that (W/kg), and what a way takes (J/(kg m)).
         terms: what it and those that it is made of add, by their names.
     """
 
@@ -210,17 +210,17 @@ class EffortMeasure(Measure):
             node.get(key)
         if node.get("name") is None:
             self.name = kind
-        self._first = self.criteria.add(*EFFORTS[kind], self, slow, *masses)
+        self._kind, power = EFFORTS[kind]
+        self._first = self.criteria.add(self._kind, power, self, slow, *masses)
 
     def result(self, times: Array, duration: float) -> Array:
         """As `Measure` says."""
-        if self.by_distance:
-            total, start, here = (self.noted(self._first, k) for k in (NOTED.TOTAL, NOTED.START, NOTED.HERE))
-            far = np.maximum(self.least_distance, np.abs(here - start))
-            self.report = {"effort": total.copy(), "distance": far}
-            found = total / (self.walkers.mass * far)
-        else:
-            found = self.average(self._first)
+        total, start, here = (self.noted(self._first, k) for k in (NOTED.TOTAL, NOTED.START, NOTED.HERE))
+        far = np.maximum(self.least_distance, np.abs(here - start))
+        if self._kind == WANG:
+            mass = self.walkers.mass
+            self.report = {"power": self.average(self._first) / mass, "transport": total / (mass * far)}
+        found = total / (self.walkers.mass * far) if self.by_distance else self.average(self._first)
         return found / len(self.walkers.names) if self.by_muscle else found
 
 

@@ -114,7 +114,7 @@ class Scenario:
         settings.get("model_file")
         self.model = model
         self.step = settings.number("fixed_control_step_size", 0.005)
-        self.begun = self._begun()
+        self.begun = begun(self.optimizer, self.folder)
         if found is not None:
             self.population = int(self.optimizer.number("lambda", POPULATION))
             self.generations = int(self.optimizer.number("max_generations", GENERATIONS))
@@ -124,15 +124,6 @@ class Scenario:
             self.optimizer.expect_all_asked(f"a {found[0]}")
         self._walkers: dict[int, Walkers] = {}
         self._refuse()
-
-    def _begun(self) -> dict[str, tuple[float, float, float]]:
-        result: dict[str, tuple[float, float, float]] = {}
-        for _, init in self.optimizer.all_of("init"):
-            own = read_par(found_file(init.text("file"), self.folder))
-            factor, best = init.number("std_factor", 1.0), init.flag("use_best_as_mean", False)
-            result |= {name: (v[0], v[0] if best else v[1], factor * v[2]) for name, v in own.items()}
-            init.expect_all_asked("an init")
-        return result
 
     def _refuse(self) -> None:
         objective, settings = self._objective, self.settings
@@ -211,10 +202,8 @@ class Scenario:
                 self.step,
                 node.number("integration_accuracy", 1e-3),
                 self._integrator,
-                node.text("leg_upper_body", "femur"),
-                node.text("leg_lower_body", ""),
-                node.text("leg_contact_force", "foot"),
                 node.number("max_integration_step_size", np.inf),
+                legs_of(node),
             )
         return self._walkers[count]
 
@@ -314,6 +303,26 @@ class Candidates:
             StoTable("excitations", times, tuple(walkers.names), excitations),
             StoTable("loads", times, legs, loads),
         )
+
+
+def begun(optimizer: Node, folder: Path) -> dict[str, tuple[float, float, float]]:
+    """Parameters of the files that a search begins with: best, mean and standard deviation."""
+    result: dict[str, tuple[float, float, float]] = {}
+    for _, init in optimizer.all_of("init"):
+        own = read_par(found_file(init.text("file"), folder))
+        factor, best = init.number("std_factor", 1.0), init.flag("use_best_as_mean", False)
+        result |= {name: (v[0], v[0] if best else v[1], factor * v[2]) for name, v in own.items()}
+        init.expect_all_asked("an init")
+    return result
+
+
+def legs_of(node: Node) -> dict[str, str]:
+    """What the legs of a model are called, as :class:`osimlite.reflexes.walkers.Felt` takes it."""
+    return {
+        "upper": node.text("leg_upper_body", "femur"),
+        "lower": node.text("leg_lower_body", ""),
+        "contact": node.text("leg_contact_force", "foot"),
+    }
 
 
 def _matches(path: str, patterns: Sequence[str]) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ from osimlite.kernels.layout import OUTCOME
 from osimlite.kernels.pointers import Ints
 from osimlite.kernels.reflexes import REFLEXES
 from osimlite.kernels.senses import OF_MUSCLES, SENSES
-from osimlite.kernels.walks import COUNTS, LEGS, STEPS
+from osimlite.kernels.walks import COUNTS, STEPS
 from osimlite.multibody.mechanism import GROUND
 from osimlite.multibody.spatial import Array
 from osimlite.schema.forces import CoordinateLimitForce
@@ -21,6 +21,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.copies import Copies
 from osimlite.simulation.elements.contact import PairContact
+from osimlite.simulation.run import Simulation
 from osimlite.text import did_you_mean, listed
 
 SIDES = "_l", "_r"
@@ -52,90 +53,64 @@ LAGGING = "euler2", "merson"
 """Integrators of SCONE, whose control steps begin with the derivative that the one before has ended with."""
 
 
-class Walkers:
-    """Candidates of a model.
+class Felt:
+    """What is felt of a model, and what is driven: names, legs, and the plan of a row.
 
     Args:
-        model: that walks.
-        count: of the candidates.
+        model: whose.
+        simulation: of it.
+        count: of its copies, each of which has numbers of its own.
         step: for which controls are held, s.
-        accuracy: of the integrator.
-        integrator: which.
-        upper: name of the bodies of upper legs, without the side.
-        lower: of feet; empty for those two below.
-        contact: of the forces of feet.
-        longest: of the integrator's own steps, s.
+        lags: whether control steps begin with the derivative that the one before has ended with.
+        legs: without the side the names of the bodies of upper legs (`upper`), of feet (`lower`; empty for those two
+            below), and of the forces of feet (`contact`).
 
     Attributes:
+        names: of the actuators, muscles first.
+        order: number of the control of each among those of the model.
+        coordinates: their names, in the order of the state.
         senses, known: plan of the rows, and its numbers.
-        rows: what is felt of each (w, r).
-        excitations: that are held (w, m).
-        progress: what is counted of each walk (w, c), see :mod:`osimlite.kernels.walks`.
-        noted: by the criteria (w, k).
-
-    Raises:
-        ModelError: it has actuators that are no muscles.
+        least, most: bounds of the controls.
     """
-
-    noted: Array
 
     def __init__(
         self,
         model: Model,
+        simulation: Simulation,
         count: int,
         step: float,
-        accuracy: float,
-        integrator: str,
-        upper: str = "femur",
-        lower: str = "",
-        contact: str = "foot",
-        longest: float = inf,
+        legs: Mapping[str, str],
+        *,
+        lags: bool = False,
     ) -> None:
-        self.count, self.step = count, step
-        self.copies = Copies(model, count, step, accuracy, integrator, longest)
-        self.engine: Any = self.copies.engine
-        self.mechanism = self.copies.simulation.mechanism
-        tree = self.copies.simulation.model.tree()
-        self.muscles: list[Any] = [tree.at(path) for path in self.copies.controls]
-        others = [item.name for item in self.muscles if not isinstance(item, Muscle)]
-        if others:
-            raise ModelError(f"{listed(others)} are no muscles, and reflexes excite muscles alone")
-        self.names = [item.name for item in self.muscles]
+        self.count, self.step, self.mechanism = count, step, simulation.mechanism
+        self._simulation, tree, known = simulation, model.tree(), simulation.forces.controls.names
+        # Of an actuator with several controls the path has a number behind.
+        owners: list[Any] = [tree.by_path.get(path) or tree.by_path[path.rpartition("_")[0]] for path in known]
+        self.order = sorted(range(len(known)), key=lambda k: not isinstance(owners[k], Muscle))
+        self.paths = [known[k] for k in self.order]
+        self.names = [path.rpartition("/")[2] for path in self.paths]
+        self.muscles: list[Any] = [owners[k] for k in self.order if isinstance(owners[k], Muscle)]
         self.optimal = np.array([item.optimal_fiber_length for item in self.muscles])
         self.strengths = np.array([item.max_isometric_force for item in self.muscles])
-        self.least = np.array([getattr(item, "minimum_activation", item.min_control) for item in self.muscles])
+        self.least, self.most = np.transpose([_bounds(owners[k]) for k in self.order]).reshape(2, -1)
         self.mass = self.mechanism.total_mass
         self.weight = self.mass * float(np.linalg.norm(self.mechanism.gravity))
-        state = self.copies.simulation.state
-        infos = self.mechanism.coordinates
+        state, infos = simulation.state, self.mechanism.coordinates
         self.coordinates = [infos[k].name for k in state.order]
-        size = len(self.coordinates)
-        self.places = {
-            **{f"{infos[k].path}/value": n for n, k in enumerate(state.order)},
-            **{f"{infos[k].path}/speed": size + n for n, k in enumerate(state.order)},
-            **{path: 2 * size + n for n, path in enumerate(state.paths)},
-        }
-        self.activations = np.array([self.places[f"{path}/activation"] for path in self.copies.controls])
-        self.legs = self._legs(upper, lower, contact)
-        self.senses, self.known = self._sensing(lags=integrator in LAGGING)
-        self.rows, self.excitations = np.zeros((count, self.senses[SENSES.SIZE])), np.zeros((count, len(self.muscles)))
-        self.progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
-        self._driven: Ints = np.array([self.copies.places, self.activations])
+        self.legs = self._legs(**legs)
+        self.senses, self.known = self._sensing(model, lags=lags)
 
-    def _sensing(self, *, lags: bool) -> tuple[Ints, Array]:
+    def _sensing(self, model: Model, *, lags: bool) -> tuple[Ints, Array]:
         """Plan of what is felt, and its numbers; see :mod:`osimlite.kernels.senses`."""
-        engine, bodies, names = self.engine, self.mechanism.bodies, self.copies.controls
+        engine: Any = self._simulation.engine
+        bodies = self.mechanism.bodies
         limits: list[int] = []
-        for item in self.copies.simulation.model.components(CoordinateLimitForce):
-            path = self.copies.simulation.model.tree().path_of(item)
+        for item in model.components(CoordinateLimitForce):
             if item.appliesForce and str(item.coordinate) in self.coordinates:
-                limits += self.coordinates.index(str(item.coordinate)), *engine.places_of(path, ("force",))
-        m, n, b, legs = len(names), len(self.coordinates), len(bodies), len(self.legs)
-        sizes = m, m, m, n, n, legs, m, n, 3 * b, 3
-        plan = [m, n, legs, len(limits) // 2, b, 0, *np.cumsum(sizes).tolist()]
-        plan += [place for path in names for place in engine.places_of(path, OF_MUSCLES)] + limits
-        plan += [placement.link for placement in engine.placements]
-        plan += [number for leg in self.legs for number in (leg.base, leg.foot, leg.pairs.start, leg.pairs.stop)]
+                places = engine.places_of(model.tree().path_of(item), ("force",))
+                limits += self.coordinates.index(str(item.coordinate)), *places
+        m, n, b, legs = len(self.muscles), len(self.coordinates), len(bodies), len(self.legs)
         centres = []
         for placement, body in zip(engine.placements, bodies, strict=True):
             frame = placement.frame
@@ -146,17 +121,37 @@ class Walkers:
             self.optimal,
             self.strengths,
             self.least,
+            self.most,
             np.ravel(centres),
             masses,
         )
-        return np.array(plan, dtype=np.int64), np.concatenate(own)
+        known = np.concatenate(own)
+        sizes = m, m, m, n, n, legs, m, n, 3 * b, 3
+        head = m, n, legs, len(limits) // 2, b, len(self.names), len(known)
+        plan = [*head, 0, *np.cumsum(sizes).tolist()]
+        plan += [place for path in self.paths[:m] for place in engine.places_of(path, OF_MUSCLES)] + limits
+        plan += [placement.link for placement in engine.placements]
+        plan += [number for leg in self.legs for number in (leg.base, leg.foot, leg.pairs.start, leg.pairs.stop)]
+        return np.array(plan, dtype=np.int64), known
+
+    def sensor(self, kind: str, number: int) -> int:
+        """Where a row has the length (L), velocity (V) or force (F) of a muscle, or the value (DP) or speed (DV) of a
+        coordinate."""
+        return int(self.senses[SENSORS[kind]]) + number
+
+    def sensors(self) -> list[str]:
+        """What reflexes may go by, in the order of a row."""
+        muscles = [path.removeprefix("/") for path in self.paths[: len(self.muscles)]]
+        named = [f"{name}.{what}" for what in ("length", "velocity", "force") for name in muscles]
+        named += [f"{name}.{what}" for what in ("value", "speed") for name in self.coordinates]
+        return named + [f"leg{leg.side}.load" for leg in self.legs]
 
     def _legs(self, upper: str, lower: str, contact: str) -> list[Leg]:
         names = [body.name for body in self.mechanism.bodies]
         parents = {body.name: names[body.parent] for body in self.mechanism.bodies if body.parent != GROUND}
         at_rest = self.mechanism.at(np.array([info.default_value for info in self.mechanism.coordinates]))
         origins = {name: at_rest.origins[k] for k, name in enumerate(names)}
-        elements = [item for item in self.copies.simulation.forces.elements if isinstance(item, PairContact)]
+        elements = [item for item in self._simulation.forces.elements if isinstance(item, PairContact)]
         first = np.cumsum([0, *(len(item.pairs) for item in elements)])
         pairs = {
             item.path.rpartition("/")[2]: range(a, b)
@@ -192,28 +187,80 @@ class Walkers:
             wanted = f"bodies '{upper}_l' and '{upper}_r', feet, and contact forces '{contact}_l' and '{contact}_r'"
             raise ModelError(f"the model has no legs, which are {wanted}{near}")
 
-    # ------------------------------------------------------------------------------------------------- walking
-    def sensor(self, kind: str, number: int) -> int:
-        """Where a row has the length (L), velocity (V) or force (F) of a muscle, or the value (DP) or speed (DV) of a
-        coordinate."""
-        return int(self.senses[SENSORS[kind]]) + number
 
+def _bounds(actuator: Any) -> tuple[float, float]:
+    """Least and largest control; OpenSim's own tools know of none for actuators with several."""
+    if isinstance(actuator, Muscle):
+        return getattr(actuator, "minimum_activation", actuator.min_control), 1.0
+    return getattr(actuator, "min_control", -inf), getattr(actuator, "max_control", inf)
+
+
+class Walkers(Felt):
+    """Candidates of a model.
+
+    Args:
+        model: that walks.
+        count: of the candidates.
+        step: for which controls are held, s.
+        accuracy: of the integrator.
+        integrator: which.
+        longest: of the integrator's own steps, s.
+        legs: as of :class:`Felt`.
+
+    Attributes:
+        rows: what is felt of each (w, r).
+        excitations: that are held (w, c).
+        progress: what is counted of each walk (w, c), see :mod:`osimlite.kernels.walks`.
+        noted: by the criteria (w, k).
+
+    Raises:
+        ModelError: it has actuators that are no muscles.
+    """
+
+    noted: Array
+
+    def __init__(
+        self,
+        model: Model,
+        count: int,
+        step: float,
+        accuracy: float,
+        integrator: str,
+        longest: float,
+        legs: Mapping[str, str],
+    ) -> None:
+        self.copies = Copies(model, count, step, accuracy, integrator, longest)
+        self.engine: Any = self.copies.engine
+        super().__init__(model, self.copies.simulation, count, step, legs, lags=integrator in LAGGING)
+        others = self.names[len(self.muscles) :]
+        if others:
+            raise ModelError(f"{listed(others)} are no muscles, and efforts of muscles alone are known")
+        state, size = self.copies.simulation.state, len(self.coordinates)
+        infos = self.mechanism.coordinates
+        self.places = {
+            **{f"{infos[k].path}/value": n for n, k in enumerate(state.order)},
+            **{f"{infos[k].path}/speed": size + n for n, k in enumerate(state.order)},
+            **{path: 2 * size + n for n, path in enumerate(state.paths)},
+        }
+        self.activations = np.array([self.places[f"{path}/activation"] for path in self.paths])
+        self.rows, self.excitations = np.zeros((count, self.senses[SENSES.SIZE])), np.zeros((count, len(self.names)))
+        self.progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
+        self._driven: Ints = np.concatenate([self.copies.places[self.order], self.activations])
+
+    # ------------------------------------------------------------------------------------------------- walking
     def go_by(self, plan: Ints, numbers: Array, criteria: Ints, bounds: Array, room: int) -> None:
         """Have walks go by reflexes (see :mod:`osimlite.kernels.reflexes`), and criteria judge them.
 
         Args:
-            plan: of the reflexes, whose `NUMBERS` and `ROOM` are left to this.
+            plan: of the reflexes, to whose `ROOM` that of the criteria is added.
             numbers: of each candidate (w, r).
             criteria: see :mod:`osimlite.kernels.criteria`.
             bounds: their numbers.
             room: that they need.
         """
-        sensors = self.senses[SENSES.ACTIVE]
-        plan[REFLEXES.SENSORS], plan[REFLEXES.NUMBERS] = sensors, numbers.shape[1]
-        first = LEGS + int(plan[REFLEXES.KEPT] * sensors)
-        plan[REFLEXES.ROOM] = first + room
-        whole = np.zeros((self.count, first + room))
-        self.noted = whole[:, first:]
+        plan[REFLEXES.ROOM] += room
+        whole = np.zeros((self.count, plan[REFLEXES.ROOM]))
+        self.noted = whole[:, plan[REFLEXES.ROOM] - room :]
         self._asked = self.senses, self.known, self._driven, plan, numbers, criteria, bounds, whole
 
     def go(self, order: int, which: Sequence[int] | None = None) -> Array:

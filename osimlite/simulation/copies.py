@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite._cores import cores
-from osimlite.kernels.layout import ITEM, MODEL
 from osimlite.kernels.pointers import Floats
 from osimlite.multibody.functions import Constant
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.engines.batch import Batch
+from osimlite.simulation.held import places_of
 from osimlite.simulation.many import BatchOptions
 from osimlite.simulation.run import Simulation
 
@@ -54,7 +54,7 @@ class Copies:
         driven = own.driven({name: Constant(0.0) for name in own.names})
         self.engine.drive(driven)
         self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
-        self.places = self._places_of(driven)
+        self.places = places_of(engine, driven)
         options = BatchOptions(to=step, accuracy=accuracy, integrator=integrator, step_bounds=(0.0, longest))
         options.check()
         self._batch = Batch(engine, np.tile(self.start, (count, 1)), options, start_holds=True)
@@ -63,14 +63,6 @@ class Copies:
         # Each core works on numbers of the model of its own, which are few enough to be near.
         self._rooms = [(self._batch.room(), engine.numbers.copy()) for _ in range(min(cores(), count))]
         self._pool = ThreadPoolExecutor(len(self._rooms) - 1) if len(self._rooms) > 1 else None
-
-    def _places_of(self, driven: Any) -> NDArray[np.int64]:
-        """Where the numbers of the model have the controls: each is the last number of its function's table."""
-        own, numbers, _ = driven.record()
-        tables = [*own[1 + len(driven.names) :], len(numbers)]
-        last = [own[1 + k] for k in range(len(driven.names))]
-        first = int(self.engine.structure[self.engine.structure[MODEL.CONTROLS] + ITEM.NUMBERS])
-        return np.array([first + tables[end] - 1 for end in last], dtype=np.int64)
 
     @property
     def states(self) -> Array:

@@ -13,7 +13,9 @@ from osimlite.text import or_known
 
 if TYPE_CHECKING:
     from osimlite.simulation.files.storage import StoTable
+    from osimlite.simulation.held import Controller
     from osimlite.simulation.stepper import Progress
+    from osimlite.simulation.trajectory import Trajectory
 
 PER_RUN = (
     "accuracy",
@@ -24,6 +26,8 @@ PER_RUN = (
     "initial_speeds",
     "equilibrate",
     "controls",
+    "controller",
+    "resume",
     "progress",
 )
 """The options of a run; the others are chosen when a model is made ready."""
@@ -72,6 +76,16 @@ class Options:
         "name or path a number, a function of time (s) or ``(times, values)``; or a table of such columns, or its "
         "file. What nothing drives has a control of 0.",
     )
+    controller: Controller | None = option(
+        None,
+        more="what drives actuators by what it feels, beside all else that does: :class:`osimlite.Feedback`. Steps are "
+        "those of an integrator.",
+    )
+    resume: Trajectory | str | Path | None = option(
+        None, "Go on where an earlier simulation ended, whose folder this is.", unit="FOLDER", type=Path | None,
+        more="Or the trajectory of one; the time goes on, too. With a controller that began a control step there, to "
+        "the last bit as if it had not ended.",
+    )  # fmt: skip
     progress: Progress | None = option(
         None,
         more="called with the simulated time reached and the length of the steps there (both in s), after every step, "

@@ -18,6 +18,7 @@ from osimlite.multibody.dynamics import require_numbers
 from osimlite.multibody.extremes import any_numbers
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import tell, tell_doubt
+from osimlite.records import replace
 from osimlite.schema.model import Model, expect_model
 from osimlite.schema.snapshot import Snapshot
 from osimlite.simulation.constrained import constraints_on, kept_state
@@ -25,13 +26,14 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import AUTO, engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
+from osimlite.simulation.held import HeldRuns, as_driven, ended, open_to, require_same
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, LOOSE, MERSON, check_integrator
 from osimlite.simulation.options import PER_RUN, Options
 from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.run_times import check_step
 from osimlite.simulation.run_times import report_times as report_times
-from osimlite.simulation.start import in_units_of, starting, state_in, suspect_value
+from osimlite.simulation.start import in_units_of, starting, state_at, state_in, suspect_value
 from osimlite.simulation.states import in_model_order
 from osimlite.simulation.stepper import Observer, Progress, Stepper
 from osimlite.simulation.summary import integration_summary, result_summary, versions
@@ -39,6 +41,7 @@ from osimlite.simulation.trajectory import Interrupted, Report, Trajectory
 
 if TYPE_CHECKING:
     from osimlite.schema.tree import Tree
+    from osimlite.simulation.files.storage import StoTable
 
 
 def simulate(model: Model, to: float = 2.0, engine: str = "auto", **choices: Any) -> Trajectory:
@@ -199,7 +202,22 @@ class Simulation:
     def _run(self, to: float, chosen: Options) -> Trajectory:
         started = time.perf_counter()
         fixed_step, initial = chosen.fixed_step, chosen.initial
-        times = report_times(to, chosen.report_interval)
+        start, before = 0.0, None
+        if chosen.resume is not None:
+            if initial or chosen.initial_speeds or chosen.equilibrate:
+                raise SettingError("a simulation that goes on starts where the other one ended; say no other start")
+            earlier, before = ended(chosen.resume)
+            start = float(earlier.times[-1]) if len(earlier.times) else 0.0
+            initial = self.state_of(earlier)
+        held = None
+        if chosen.controller is not None:
+            if fixed_step is not None:
+                raise SettingError("a controller needs the steps of an integrator; leave out the fixed step")
+            held = chosen.controller.held(self)
+            to = held.nearest(to)
+        if chosen.resume is not None:
+            require_same(held, before, start)
+        times = report_times(to, chosen.report_interval, start)
         if fixed_step is not None:
             check_step(fixed_step, to)
             for name in ("accuracy", "integrator"):
@@ -234,11 +252,20 @@ class Simulation:
 
             controls = driven(controls, chosen.controls, to)
             given = {} if chosen.controls is None else {"controls": told(chosen.controls)}
-        self.engine.drive(controls)
+        if chosen.controller is not None:
+            given["controller"] = str(chosen.controller)
+        if chosen.resume is not None:
+            given["resume"] = str(chosen.resume)
+        opened = controls if held is None else open_to(controls, held)
+        self.engine.drive(opened)
         y = self.initial_state(initial, initial_speeds, equilibrate=chosen.equilibrate)
         self._require_inertia(y)
         settings = Settings(accuracy, integrator, fixed_step, self.engine.route, chosen.show)
-        recorder, stepper, states = self._moved(y, settings, times, chosen.progress)
+        runs = None if held is None else HeldRuns(held, self.engine, opened, 1, to, before)
+        recorder, stepper, states = self._moved(y, replace(settings, held=runs), times, chosen.progress)
+        table = None if runs is None else runs.table()
+        if table is not None:
+            controls = as_driven(controls, table)
         times = times[: len(states)]
         if times[-1] < stepper.time:
             # Where it was ended, which somebody may want to go on from.
@@ -257,7 +284,7 @@ class Simulation:
             **{name: getattr(chosen, name) for name in TOLD},
             **({} if chosen.external_loads is None else {"external_loads": str(chosen.external_loads)}),
         }
-        trajectory = self._trajectory(times, states, stepper, recorder, wanted, wall, controls)
+        trajectory = self._trajectory(times, states, stepper, recorder, wanted, wall, controls, table)
         if isinstance(stepper.ended, SimulationError):
             stepper.ended.trajectory = trajectory if stepper.taken else None
             raise stepper.ended
@@ -327,7 +354,7 @@ class Simulation:
     ) -> tuple[Recorder, Stepper, Sequence[Any]]:
         """What was recorded and integrated from a state, and the states at times (s)."""
         recorder = Recorder(self.engine)
-        stepper = self._stepper(0.0, y, settings, recorder.observe)
+        stepper = self._stepper(times[0], y, settings, recorder.observe)
         recorder.begin(stepper)
         return recorder, stepper, stepper.table(times, progress)
 
@@ -388,6 +415,10 @@ class Simulation:
         """A state of a file such as ``states.sto``, as `run` takes it for `initial`; see :func:`state_in`."""
         return state_in(path, self.mechanism, self.paths, time)
 
+    def state_of(self, table: StoTable) -> dict[str, float]:
+        """The last state of a table in SI units, likewise."""
+        return state_at(table, self.mechanism, self.paths)
+
     def _trajectory(
         self,
         times: list[float],
@@ -397,6 +428,7 @@ class Simulation:
         settings: dict[str, Any],
         wall: float,
         controls: Controls,
+        controller: StoTable | None,
     ) -> Trajectory:
         def asked(what: Callable[[Engine], Any]) -> Any:
             """What the engine says, as it was in this run: since then there may have been others."""
@@ -429,7 +461,9 @@ class Simulation:
         )
         values, speeds = self.state.histories(states)
         auxiliary = self.state.auxiliary_histories(states)
-        return Trajectory(self.mechanism, times, values, speeds, report, auxiliary, self.paths, self._snapshot)
+        return Trajectory(
+            self.mechanism, times, values, speeds, report, auxiliary, self.paths, self._snapshot, controller
+        )
 
 
 @any_numbers

@@ -32,8 +32,8 @@ def check_step(h: float, to: float) -> None:
         raise SettingError(f"{to:g} s in fixed steps of {h:g} s are more than a thousand million; take longer steps")
 
 
-def report_times(to: float, interval: float) -> list[float]:
-    """0, interval, 2 interval ... and `to` (s).
+def report_times(to: float, interval: float, start: float = 0.0) -> list[float]:
+    """`start`, those of interval, 2 interval ... after it, and `to` (s).
 
     Raises:
         SimulationError: a number has no meaning.
@@ -41,8 +41,9 @@ def report_times(to: float, interval: float) -> list[float]:
     for number in (to, interval):
         if not _is_number(number):
             raise SettingError(f"a time is a number of seconds, not {number!r}")
-    if not (isfinite(to) and to > 0.0):
-        raise SettingError(f"a simulation goes on for a positive time, not {to:g} s")
+    if not (isfinite(to) and to > start):
+        told = "for a positive time, not" if start == 0.0 else f"from {start:g} s on, and not to"
+        raise SettingError(f"a simulation goes on {told} {to:g} s")
     if not (isfinite(interval) and interval > 0.0):
         raise SettingError(f"the report interval is a positive time, not {interval:g} s")
     if to / interval > 1e7:
@@ -51,4 +52,6 @@ def report_times(to: float, interval: float) -> list[float]:
     # A last moment that differs from `to` only by rounding is `to`.
     if to - times[-1] <= 1e-9 * interval:
         times.pop()
+    if start > 0.0:
+        times = [start, *(time for time in times if time - start > 1e-9 * interval)]
     return [*times, to]

@@ -12,7 +12,7 @@ import numpy as np
 from osimlite.errors import DocumentError, SettingError, SimulationError
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.quantity import Quantity, doubt, quantity
-from osimlite.simulation.files.storage import read_sto
+from osimlite.simulation.files.storage import StoTable, read_sto
 
 if TYPE_CHECKING:
     from osimlite.multibody.parts import CoordinateInfo
@@ -150,11 +150,17 @@ def state_in(
     Raises:
         DocumentError: it is no table, has no states of the mechanism, or no rows.
     """
-    table = read_sto(path)
+    return state_at(read_sto(path), mechanism, names, time)
+
+
+def state_at(
+    table: StoTable, mechanism: Mechanism, names: Collection[str], time: float | None = None
+) -> dict[str, float]:
+    """A state of a table; see `state_in`."""
     columns = columns_of_states(table.columns, names)
     if not columns or not len(table.times):
         what = f"column is a state of '{mechanism.name}', such as '{next(iter(names), '')}'" if not columns else "row"
-        raise DocumentError(f"no {what}; give a file of its states", file=str(path))
+        raise DocumentError(f"no {what}; give a file of its states", file=table.file)
     row = table.rows[-1 if time is None else int(np.argmin(np.abs(table.times - time)))].tolist()
     turning = {info.path for info in mechanism.coordinates if info.motion_type == "rotational"}
     return {

@@ -18,7 +18,7 @@ from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.snapshot import Snapshot
-from osimlite.simulation.files.storage import sto_text
+from osimlite.simulation.files.storage import StoTable, sto_text
 from osimlite.simulation.tabular import Tabular
 from osimlite.text import json_lines
 
@@ -37,6 +37,7 @@ class Trajectory(Tabular):
         auxiliary: other states that are integrated (n,), by their paths in OpenSim: the energy, J, that the dampers of
             a BushingForce have taken up, or of a CoordinateLimitForce that is to compute it.
         paths: of all states, in the order of OpenSim: ".../value" and ".../speed" of the coordinates, and `auxiliary`.
+        controller: what was recorded at each control step of a controller, None without one.
     """
 
     _repr_html_ = shown_in_notebooks("trajectory")
@@ -51,9 +52,10 @@ class Trajectory(Tabular):
         auxiliary: Mapping[str, ArrayLike] = MappingProxyType({}),
         paths: Sequence[str] = (),
         model: Model | Snapshot | None = None,
+        controller: StoTable | None = None,
     ) -> None:
         count = len(mechanism.coordinates)
-        self.mechanism, self._model = mechanism, model
+        self.mechanism, self._model, self.controller = mechanism, model, controller
         self.times: Array = np.array(times, dtype=float)
         self.coordinates = mechanism.coordinate_names
         self.values: Array = np.array(values, dtype=float).reshape(len(self.times), count)
@@ -169,13 +171,18 @@ class Trajectory(Tabular):
                 data[name] = ("time", f"{name}_name"), np.column_stack(list(columns.values()))
         return xarray.Dataset(data, coords, {"model": self.mechanism.name})
 
-    def states_text(self) -> str:
-        """The text of states.sto: all states, in the order of `paths`."""
+    @property
+    def states(self) -> StoTable:
+        """All states, in the order of `paths`."""
         columns: dict[str, Array] = dict(self.auxiliary)
         for index, info in enumerate(self.mechanism.coordinates):
             columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = self.values[:, index], self.speeds[:, index]
         rows = np.array([columns[path] for path in self.paths]).reshape(len(self.paths), len(self.times)).T
-        return sto_text(self.mechanism.name, self.times.tolist(), self.paths, rows.tolist())
+        return StoTable(self.mechanism.name, self.times, self.paths, rows)
+
+    def states_text(self) -> str:
+        """The text of states.sto."""
+        return text_of(self.states)
 
     def forces_text(self) -> str:
         """The text of forces.sto, with the labels of OpenSim's ForceReporter."""
@@ -190,7 +197,7 @@ class Trajectory(Tabular):
         return sto_text("ModelProbes", self.times.tolist(), labels, table.tolist()) if labels else ""
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write ``states.sto``, ``forces.sto``, ``summary.json`` and, if the model has probes, ``probes.sto``.
+        """Write ``states.sto``, ``forces.sto``, ``summary.json``; ``probes.sto``, ``controller.sto`` if there are any.
 
         The folder is made if it is not there.
 
@@ -202,12 +209,18 @@ class Trajectory(Tabular):
             "states.sto": self.states_text(),
             "forces.sto": self.forces_text(),
             **({"probes.sto": text} if (text := self.probes_text()) else {}),
+            **({} if self.controller is None else {"controller.sto": text_of(self.controller)}),
             "summary.json": json_lines(self.summary),
         }
         make_folder(base)
         for name, text in texts.items():
             write_atomically(base / name, text)
         return [base / name for name in texts]
+
+
+def text_of(table: StoTable) -> str:
+    """The text of a table's file."""
+    return sto_text(table.name, table.times.tolist(), table.columns, table.rows.tolist())
 
 
 class Interrupted(KeyboardInterrupt):

@@ -68,8 +68,9 @@ class KernelEngine(System):
                 names=self.state.names,
                 projected=self.projected,
             )
+        bounds, held = settings.step_bounds, settings.held
         return ControlledSteps(
-            self, t, y, settings.accuracy, observe, settings.integrator, step_bounds=settings.step_bounds
+            self, t, y, settings.accuracy, observe, settings.integrator, step_bounds=bounds, held=held
         )
 
     def projected(self, t: float, y: Sequence[float], tolerance: float) -> list[float] | None:

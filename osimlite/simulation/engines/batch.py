@@ -20,6 +20,7 @@ from osimlite.simulation.many import BatchOptions
 
 if TYPE_CHECKING:
     from osimlite.simulation.engines.base import KernelEngine
+    from osimlite.simulation.held import HeldRuns
 
 NO_KINDS, NO_LEVELS = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 7))
 
@@ -38,6 +39,7 @@ class Batch:
         levels: of the watches (k, 7).
         most_logged: room for steps in the log, which all runs share.
         start_holds: the constraints hold where the runs start; otherwise they start from the nearest such states.
+        held: of a controller that they go by, which writes into the numbers of each.
 
     Attributes:
         clocks: time and next step of each run, s (W, 2).
@@ -65,10 +67,11 @@ class Batch:
         levels: Floats = NO_LEVELS,
         most_logged: int = 0,
         start_holds: bool = False,
+        held: HeldRuns | None = None,
     ) -> None:
         self.states = engine.state.table(states)
         (count, size), pairs = self.states.shape, len(engine.contacts)
-        self._engine, self._kinds, self._levels = engine, kinds, levels
+        self._engine, self._kinds, self._levels, self._held = engine, kinds, levels, held
         self._vectors = engine.numbers[None] if vectors is None else vectors
         self._times = np.array(options.report_times, dtype=np.float64)
         self._settings = options.to, options.accuracy, *engine.counted, *options.step_bounds
@@ -106,8 +109,9 @@ class Batch:
         each = vectors.shape[1] if len(vectors) > 1 else 0
         own = self._sizes, self.clocks, self.counts, self.states
         records = self._times, self.reports, self.log, self.forces, self.events, self.peaks
-        parts = *records, self._kinds, self._levels, self.endings, first, len(self.states) if last is None else last
-        self._call("run_several", vectors, room, each, *own, *parts)
+        law, more = ("run_several", ()) if self._held is None else ("run_by_reflexes", self._held.parts)
+        parts = *records, self._kinds, self._levels, self.endings, *more
+        self._call(law, vectors, room, each, *own, *parts, first, len(self.states) if last is None else last)
 
     def hold(self, law: str, room: Floats, numbers: Floats, *parts: Any) -> int:
         """Compute by a law of :mod:`osimlite.kernels.walks`, with what it takes besides.

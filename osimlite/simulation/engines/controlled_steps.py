@@ -28,6 +28,7 @@ from osimlite.simulation.stepper import IntegrationError, Observer, Progress, St
 
 if TYPE_CHECKING:
     from osimlite.simulation.engines.base import KernelEngine
+    from osimlite.simulation.held import HeldRuns
 
 FIRST_STEPS, LOGGED_STEPS = 8, 512
 """So many steps are taken in the first call of an engine's first motion, and in any other at most."""
@@ -59,6 +60,7 @@ class ControlledSteps(Stepper):
         observe: called with (time, state) for each step; of those that a table takes, once somebody wants to know.
         integrator: which of `INTEGRATORS`.
         step_bounds: shortest and longest step of Merson's method, s.
+        held: of a controller.
 
     Attributes:
         attempted: steps tried so far, of which `taken` were accepted.
@@ -76,12 +78,14 @@ class ControlledSteps(Stepper):
         integrator: str = MERSON,
         *,
         step_bounds: tuple[float, float] = NO_BOUNDS,
+        held: HeldRuns | None = None,
     ) -> None:
         if not 0.0 < accuracy < 1.0:
             raise SettingError(f"The accuracy must lie between 0 and 1; {accuracy} does not.")
         super().__init__(engine.derivative, t, y, observe, engine.state.names)
         self._engine, self._accuracy, self._integrator, self._step_bounds = engine, accuracy, integrator, step_bounds
-        self._next_step = min(max(INITIAL_STEP, step_bounds[0]), step_bounds[1])
+        self._held = held
+        self._next_step = min(max(INITIAL_STEP, step_bounds[0]), step_bounds[1]) if held is None else held.next_step
         self._room: Floats | None = None
         self._put_off: list[tuple[Floats, Floats]] = []
         self._seen: tuple[float, list[float], Sequence[float]] = (self.time, self.state, self.derivative)
@@ -156,6 +160,7 @@ class ControlledSteps(Stepper):
             next_step=self._next_step,
             most_logged=LOGGED_STEPS,
             start_holds=True,
+            held=self._held,
         )
         batch.counts[0, : record.REPORTED] = self.taken, self.attempted, self.evaluations
         batch.reports[0, : bisect_right(times, self.time)] = self.state

@@ -21,6 +21,7 @@ from osimlite.simulation.stepper import Observer, Stepper
 
 if TYPE_CHECKING:
     from osimlite.robot.visuals import Visuals
+    from osimlite.simulation.held import HeldRuns
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class Settings:
     visuals: Visuals | None = None  # what bodies look like there
     # shortest and longest step (s) of Merson's method; the shortest is taken whatever its error
     step_bounds: tuple[float, float] = NO_BOUNDS
+    held: HeldRuns | None = None  # of a controller
 
 
 class Engine(Protocol):

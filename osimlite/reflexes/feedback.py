@@ -1,0 +1,90 @@
+"""Reflexes that drive the actuators of any simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from osimlite.errors import SettingError
+from osimlite.kernels.reflexes import TERM
+from osimlite.kernels.senses import SENSED
+from osimlite.reflexes.controllers import CONTROLLERS, Reflexes
+from osimlite.reflexes.parameters import Parameters, read_par
+from osimlite.reflexes.scenario import OPTIMIZERS, begun, legs_of
+from osimlite.reflexes.settings import Node, read_settings, settings_of
+from osimlite.reflexes.walkers import Felt
+from osimlite.simulation.held import Held
+from osimlite.simulation.run import Simulation
+from osimlite.text import listed, or_known
+
+
+class Feedback:
+    """A controller for ``osimlite.simulate(model, controller=Feedback("hold.yaml"))``.
+
+    It computes the controls of the actuators that its reflexes name at every control step, and holds them between; what
+    else drives these adds to it.
+
+    Args:
+        given: file with a ReflexController, GaitStateController or CompositeController, alone or in a scenario: SCONE's
+            or YAML; or the same as data of Python. Beside one that stands alone there may be an `init`, and
+            `fixed_control_step_size` and what legs are called, which a scenario has in its ModelOpenSim4.
+        values: of its parameters, or a file of them (.par); others stand for the best that `init` has, or their means.
+
+    Attributes:
+        step: for which controls are held, s.
+
+    Raises:
+        DocumentError: it has something that is not done here; its name and line are told.
+    """
+
+    def __init__(
+        self, given: str | Path | Mapping[str, Any], values: Mapping[str, float] | str | Path = MappingProxyType({})
+    ) -> None:
+        if isinstance(given, Mapping):
+            self._told, top, folder = "data of Python", settings_of(given), Path()
+        else:
+            self._told, top, folder = str(given), read_settings(given), Path(given).parent
+        optimizer = next((node for _, node in top.all_of(*OPTIMIZERS)), top)
+        objective = optimizer.get("SimulationObjective")
+        holder, model = top, top
+        if objective is not None:
+            holder, model = objective, objective.get("ModelOpenSim4") or Node()
+        found = next(iter(holder.all_of(*CONTROLLERS)), None)
+        if found is None:
+            raise holder.error(f"a controller is needed: {listed(list(CONTROLLERS))}")
+        self._kind, self._node = found
+        self.step, self._legs = model.number("fixed_control_step_size", 0.005), legs_of(model)
+        if not self.step > 0.0:
+            raise model.error(f"a control step of {self.step:g} s is none; fixed_control_step_size is to be positive")
+        known = {name: best for name, (best, _, _) in begun(optimizer, folder).items()}
+        if isinstance(values, str | Path):
+            values = {name: best for name, (best, _, _) in read_par(values).items()}
+        self._begun, self._values = known, {**known, **values}
+        if objective is None:
+            top.expect_all_asked("a file of a controller")
+
+    def __str__(self) -> str:
+        return self._told
+
+    def held(self, simulation: Simulation) -> Held:
+        """What the kernels go by, for a model.
+
+        Raises:
+            OsimliteError: the model has not what a reflex names, or a value belongs to no parameter.
+        """
+        felt = Felt(simulation.model, simulation, 1, self.step, self._legs)
+        parameters = Parameters(self._values)
+        reflexes = Reflexes(self._node, self._kind, felt, parameters)
+        for name in self._values:
+            if name not in parameters.found and name not in self._begun:
+                raise SettingError(f"the controller has no parameter '{name}'{or_known(name, parameters.found)}")
+        plan, numbers = reflexes.compiled()
+        # What no reflex names is left to others.
+        others = np.setdiff1d(np.arange(len(felt.names)), [term.ints[TERM.TARGET] for term in reflexes.terms])
+        first, known = SENSED.HEAD + 2 * len(felt.muscles), felt.known.copy()
+        known[first + others] = known[first + len(felt.names) + others] = 0.0
+        return Held(tuple(felt.paths), self.step, tuple(felt.sensors()), felt.senses, known, plan, numbers)

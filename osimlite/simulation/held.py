@@ -1,0 +1,191 @@
+"""Controls that are computed at control steps and held between: what a run is given of a controller, and keeps of it.
+
+What a controller knows of what was (its sensors over as long as they are delayed, states of legs, the controls that are
+held, the step that the integrator would try next) is recorded at each control step, in a table: a run that goes on from
+the table and the state at a control step goes on to the last bit as if it had not ended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import floor
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from osimlite.errors import SettingError
+from osimlite.kernels.layout import ITEM, MODEL
+from osimlite.kernels.pointers import Floats, Ints
+from osimlite.kernels.reflexes import EARLY_STANCE, REFLEXES, UNKNOWN
+from osimlite.kernels.senses import SENSES
+from osimlite.kernels.walks import COUNTS, FRAMES, LEGS, STEPS
+from osimlite.multibody.functions import Constant, Function, PiecewiseConstant
+from osimlite.records import dataclass
+from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.simulation.integrators import INITIAL_STEP
+
+if TYPE_CHECKING:
+    from osimlite.simulation.elements.controls import Controls
+    from osimlite.simulation.run import Simulation
+    from osimlite.simulation.trajectory import Trajectory
+
+NEAR = 1e-9
+"""A time that is so near to the start of a control step, as part of one, is that."""
+STATES, TABLE = "states.sto", "controller.sto"
+"""Files that a run goes on from."""
+
+
+class Controller(Protocol):
+    """What drives actuators by what it feels, such as :class:`osimlite.Feedback`."""
+
+    def held(self, simulation: Simulation) -> Held:
+        """What the kernels go by."""
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A controller of a model, as the kernels have it (:mod:`osimlite.kernels.walks`)."""
+
+    paths: tuple[str, ...]  # of the controls, in the order that it has them
+    step: float  # for which they are held, s
+    sensors: tuple[str, ...]  # what is remembered of a control step
+    senses: Ints  # see :mod:`osimlite.kernels.senses`
+    known: Floats  # its numbers
+    plan: Ints  # see :mod:`osimlite.kernels.reflexes`
+    numbers: Floats  # its numbers
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Of the table of what is recorded."""
+        legs = "leg_l.state", "leg_r.state"
+        return (*self.sensors, *legs, *self.paths, "next_step")
+
+    def steps_in(self, time: float) -> int:
+        """How many control steps there are up to a time, s."""
+        return floor(time / self.step + NEAR)
+
+    def nearest(self, time: float) -> float:
+        """The very time of the control step that begins at a time, s, if one does."""
+        nearest = round(time / self.step) * self.step
+        return nearest if abs(nearest - time) < NEAR * self.step else time
+
+
+class HeldRuns:
+    """Runs by a controller.
+
+    Args:
+        held: of a model.
+        engine: of the model, which is driven by `controls`.
+        controls: in which each of the controller's has a number of its own, see :func:`open_to`.
+        count: of the runs.
+        to: time at which they end, s.
+        before: what was recorded of the run that a single one goes on from.
+
+    Attributes:
+        next_step: that the integrator tries first, s.
+        parts: what `run_by_reflexes` takes besides.
+    """
+
+    def __init__(
+        self, held: Held, engine: Any, controls: Controls, count: int, to: float, before: StoTable | None = None
+    ) -> None:
+        self.held, self._before, self.next_step = held, before, INITIAL_STEP
+        plan, senses = held.plan.copy(), held.senses
+        driven = places_of(engine, controls)[[controls.names.index(path) for path in held.paths]]
+        self._room, rows = np.zeros((count, plan[REFLEXES.ROOM])), np.zeros((count, senses[SENSES.SIZE]))
+        self._room[:, :LEGS] = UNKNOWN if plan[REFLEXES.HAS_STATES] else EARLY_STANCE
+        self._excitations = np.zeros((count, len(held.paths)))
+        self._progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
+        if before is not None:
+            self._go_on(plan, before)
+        if count == 1:
+            plan[REFLEXES.ROWS] = held.steps_in(to) + 2 - plan[REFLEXES.FIRST]
+        self._record, self._plan = np.empty((plan[REFLEXES.ROWS], len(held.columns))), plan
+        known, numbers = (np.tile(given, (count, 1)) for given in (held.known, held.numbers))
+        self.parts = (
+            *(senses, known, driven, plan, numbers),
+            *(self._room, rows, self._excitations, self._record, self._progress),
+        )
+
+    def _go_on(self, plan: Ints, before: StoTable) -> None:
+        """Know what was."""
+        frames = self.held.steps_in(before.times[-1]) + 1
+        kept, sensors = int(plan[REFLEXES.KEPT]), len(self.held.sensors)
+        history = self._room[0, LEGS : LEGS + kept * sensors].reshape(kept, sensors)
+        for back, row in enumerate(before.rows[: -1 - kept : -1]):
+            history[(frames - 1 - back) % kept] = row[:sensors]
+        last = before.rows[-1, sensors:]
+        self._room[0, :LEGS], self._excitations[0], self.next_step = last[:LEGS], last[LEGS:-1], float(last[-1])
+        self._progress[0, [STEPS, FRAMES]] = plan[REFLEXES.FIRST] = frames
+
+    def table(self) -> StoTable:
+        """What was recorded of a single run, after the last rows of the one before that a further one would need."""
+        new = int(self._progress[0, STEPS] - self._plan[REFLEXES.FIRST])
+        times = self.held.step * np.arange(self._progress[0, STEPS] - new, self._progress[0, STEPS], dtype=np.float64)
+        rows = self._record[:new].copy()
+        if self._before is not None:
+            kept = int(self._plan[REFLEXES.KEPT])
+            times = np.concatenate([self._before.times[-kept:], times])
+            rows = np.concatenate([self._before.rows[-kept:], rows])
+        return StoTable("controller", times, self.held.columns, rows)
+
+
+def open_to(controls: Controls, held: Held) -> Controls:
+    """Controls to which a controller adds.
+
+    Raises:
+        SettingError: a control is a function of Python, beside which no machine code adds anything.
+    """
+    result = controls.driven({path: Constant(0.0) for path in held.paths})
+    if not isinstance(result.record()[2], str):
+        raise SettingError("beside a controller, controls are numbers or tables, not functions of Python")
+    return result
+
+
+def as_driven(controls: Controls, table: StoTable) -> Controls:
+    """Controls with what a controller has added, as functions of time."""
+    times = tuple(table.times.tolist())
+    added: Mapping[str, Function] = {
+        path: PiecewiseConstant(times, tuple(table[path].tolist())) for path in controls.names if path in table.columns
+    }
+    return controls.driven(added)
+
+
+def places_of(engine: Any, driven: Controls) -> Ints:
+    """Where the numbers of the model have the last function of each control, a constant."""
+    own, numbers, _ = driven.record()
+    tables = [*own[1 + len(driven.names) :], len(numbers)]
+    last = [own[1 + k] for k in range(len(driven.names))]
+    first = int(engine.structure[engine.structure[MODEL.CONTROLS] + ITEM.NUMBERS])
+    return np.array([first + tables[end] - 1 for end in last], dtype=np.int64)
+
+
+def ended(given: str | Path | Trajectory) -> tuple[StoTable, StoTable | None]:
+    """The states of a run, and what was recorded of its controller, from its folder or itself.
+
+    Raises:
+        OsimliteError: there are no states.
+    """
+    if not isinstance(given, str | Path):
+        return given.states, given.controller
+    table = Path(given) / TABLE
+    return read_sto(Path(given) / STATES), read_sto(table) if table.exists() else None
+
+
+def require_same(held: Held | None, before: StoTable | None, end: float) -> None:
+    """Refuse what was recorded of another controller, or not up to the end of a run (s).
+
+    Raises:
+        SettingError: it is so.
+    """
+    if held is None and before is not None:
+        raise SettingError("the run that this one goes on from had a controller; give it, too")
+    if held is None:
+        return
+    if before is None:
+        raise SettingError(f"the run that this one goes on from has left no {TABLE}, and so had no controller")
+    if before.columns != held.columns:
+        raise SettingError("the run that this one goes on from had a controller with other sensors or actuators")
+    if not 0.0 <= end - before.times[-1] < held.step * (1.0 + 1e-9):
+        raise SettingError(f"what is known of the controller ends at {before.times[-1]:g} s, the states at {end:g} s")

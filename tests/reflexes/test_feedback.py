@@ -1,0 +1,260 @@
+"""Reflexes that drive the actuators of simulations, and noise."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+
+import osimlite
+from osimlite.errors import OsimliteError
+from osimlite.gym.tasks import arm as task
+from osimlite.kernels.reflexes import normal, philox
+from osimlite.models.walking import write_scenario
+from osimlite.reflexes.scenario import Scenario
+from osimlite.simulation.trajectory import Interrupted
+
+REFLEXES = {
+    "dual_sided": 0,
+    "DofReflex": [
+        {"target": "flexor", "source": "elbow", "P0": 1.2, "KP": "~2<0,20>", "KV": 0.3, "delay": 0.013, "C0": 0.1},
+        {"target": "extensor", "source": "elbow", "P0": 1.2, "KP": -1, "allow_neg_P": 0},
+    ],
+    "MuscleReflex": {"target": "extensor", "source": "flexor", "KF": 0.2, "KV": 0.01, "delay": 0.005},
+}
+STEP = 0.005
+simulate: Any = osimlite.simulate
+"""With a controller its trajectory has a table of that."""
+
+
+@pytest.fixture(scope="module")
+def model():
+    made = task().model()
+    motor = osimlite.CoordinateActuator(
+        name="motor", coordinate="elbow", optimal_force=2.0, min_control=-0.2, max_control=0.5
+    )
+    made.add(motor)
+    return made
+
+
+def same(one, other) -> bool:
+    return np.array_equal(one.times, other.times) and np.array_equal(one.states.rows, other.states.rows)
+
+
+def test_controls_are_sums_of_what_was_felt(model) -> None:
+    feedback = osimlite.Feedback({"ReflexController": REFLEXES}, {"flexor-elbow.KP": 3.0})
+    moved = simulate(model, 0.3, controller=feedback, report_interval=STEP)
+    told, count = moved.controller, 61
+    assert told.times == pytest.approx(STEP * np.arange(count), abs=0.0)
+    # What it felt is what was there.
+    assert told["elbow.value"] == pytest.approx(moved.values[:, -1], abs=1e-15)
+    strength = model.tree().by_path["/forceset/flexor"].max_isometric_force
+    assert told["forceset/flexor.force"] == pytest.approx(moved.forces["flexor"] / strength, abs=1e-12)
+
+    def before(column: str, delay: float):
+        return np.interp(told.times - delay, told.times, told[column])
+
+    angle, speed = (before(f"elbow.{what}", 0.013) for what in ("value", "speed"))
+    flexor = 3.0 * (1.2 - angle) - 0.3 * speed + 0.1
+    extensor = np.maximum(told["elbow.value"] - 1.2, 0.0)
+    extensor += 0.2 * before("forceset/flexor.force", 0.005)
+    extensor += 0.01 * np.maximum(before("forceset/flexor.velocity", 0.005), 0.0)
+    assert told["/forceset/flexor"] == pytest.approx(np.clip(flexor, 0.0, 1.0), abs=1e-12)
+    assert told["/forceset/extensor"] == pytest.approx(np.clip(extensor, 0.0, 1.0), abs=1e-12)
+    assert np.ptp(told["/forceset/flexor"]) > 0.1 and (told["/forceset/motor"] == 0.0).all()
+
+
+@pytest.mark.parametrize("integrator", ["merson", "euler2", "rosenbrock", "bdf", "adams"])
+def test_runs_go_on_bit_for_bit(model, integrator, tmp_path) -> None:
+    feedback = osimlite.Feedback({"ReflexController": REFLEXES})
+    whole = simulate(model, 0.4, controller=feedback, integrator=integrator)
+    first = simulate(model, 0.1, controller=feedback, integrator=integrator)
+    first.write(tmp_path / "first")
+    second = simulate(model, 0.3, controller=feedback, integrator=integrator, resume=tmp_path / "first")
+    third = simulate(model, 0.4, controller=feedback, integrator=integrator, resume=second)
+    assert third.times[0] == 0.3 and third.times[-1] == 0.4
+    rows = slice(30, None)
+    assert np.array_equal(third.times, whole.times[rows])
+    assert np.array_equal(third.states.rows, whole.states.rows[rows])
+    told = third.controller
+    assert np.array_equal(told.rows, whole.controller.rows[-len(told.times) :])
+    assert {name: column[-1] for name, column in third.forces.items()} == {
+        name: column[-1] for name, column in whole.forces.items()
+    }
+
+
+def test_a_human_goes_on_in_the_midst_of_a_walk(tmp_path) -> None:
+    """With states of legs, contact, delays of several control steps."""
+    file = write_scenario(tmp_path)
+    scenario = Scenario(file)
+    start = scenario.walk(scenario.best(), duration=0.005).states
+    initial = {path: float(start[path][0]) for path in start.columns}
+    choices = {"controller": osimlite.Feedback(file), "integrator": "euler2", "report_interval": 0.05}
+    whole = simulate(scenario.model, 2.0, initial=initial, **choices)
+    assert np.ptp(whole.states["/jointset/ground_pelvis/pelvis_tx/value"]) > 1.5
+    assert {0.0, 1.0, 2.0, 3.0} <= {*whole.controller["leg_l.state"]}
+    first = simulate(scenario.model, 0.75, initial=initial, **choices)
+    second = simulate(scenario.model, 2.0, resume=first, **choices)
+    assert np.array_equal(second.states.rows, whole.states.rows[15:])
+    # Events are those of the whole.
+    events = [each for each in whole.summary["contact_events"] if each["time_s"] > 0.75]
+    begun = [each for each in second.summary["contact_events"] if each["time_s"] > 0.75]
+    assert [each["contact"] for each in begun] == [each["contact"] for each in events]
+    assert [each["time_s"] for each in begun] == pytest.approx([each["time_s"] for each in events], abs=1e-8)
+
+
+def test_an_interrupted_run_goes_on(model) -> None:
+    feedback = osimlite.Feedback({"ReflexController": REFLEXES})
+
+    def stop(time: float, _: float) -> None:
+        if time > 0.1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted) as stopped:
+        simulate(model, 0.5, controller=feedback, progress=stop)
+    first = stopped.value.trajectory
+    second = simulate(model, 0.5, controller=feedback, resume=first)
+    whole = simulate(model, 0.5, controller=feedback)
+    assert 0.1 < second.times[0] < 0.5 and second.values[-1] == pytest.approx(whole.values[-1], abs=1e-6)
+
+
+def test_motors_are_driven_beside_what_else_drives(model) -> None:
+    reflex = {"target": "motor", "source": "elbow", "P0": 1.2, "KP": 5, "KV": 1, "delay": 0.005}
+    given = {"ReflexController": {"dual_sided": 0, "DofReflex": reflex}, "fixed_control_step_size": 0.002}
+    moved = simulate(model, 0.5, controller=osimlite.Feedback(given), controls={"flexor": 0.1, "motor": 0.3})
+    told = moved.controller["/forceset/motor"]
+    assert told[0] == 0.5 and told.min() < 0.49 and len(told) == 251
+    # What the motor pushes is what it is driven by, also between the control steps.
+    expected = 2.0 * (0.3 + told[::5])
+    assert moved.forces["motor"] == pytest.approx(expected, abs=1e-12)
+    # The same controls without a controller are the same motion.
+    held = osimlite.PiecewiseConstantFunction(x=tuple(moved.controller.times), y=tuple(0.3 + told))
+    again = simulate(model, 0.5, controls={"flexor": 0.1, "motor": held}, accuracy=1e-7)
+    assert again.values == pytest.approx(moved.values, abs=2e-5)
+
+
+def test_any_run_goes_on(model, tmp_path) -> None:
+    first = simulate(model, 0.2, controls={"flexor": 0.3})
+    first.write(tmp_path)
+    whole = simulate(model, 0.4, controls={"flexor": 0.3}, accuracy=1e-8)
+    second = simulate(model, 0.4, controls={"flexor": 0.3}, resume=tmp_path, accuracy=1e-8)
+    assert second.times[0] == 0.2 and second.values[-1] == pytest.approx(whole.values[-1], abs=1e-3)
+
+
+def test_what_has_no_meaning_is_refused(model, tmp_path) -> None:
+    feedback, other = (osimlite.Feedback({"ReflexController": {"dual_sided": 0, "DofReflex": {
+        "target": name, "source": "elbow", "KP": 1}}}) for name in ("motor", "flexor"))  # fmt: skip
+    first = simulate(model, 0.1, controller=feedback)
+    plain, finer = simulate(model, 0.1), task().model()
+    first.write(tmp_path / "first")
+    (tmp_path / "first" / "controller.sto").unlink()
+    for words, choices in (
+        ("goes on from 0.1 s on, and not to 0.05", {"to": 0.05, "resume": first, "controller": feedback}),
+        ("had a controller; give it", {"resume": first}),
+        ("so had no controller", {"resume": plain, "controller": feedback}),
+        (r"has left no controller\.sto", {"resume": tmp_path / "first", "controller": feedback}),
+        ("say no other start", {"resume": first, "controller": feedback, "initial": {"elbow": 1.0}}),
+        ("leave out the fixed step", {"controller": feedback, "fixed_step": 0.001}),
+        ("not functions of Python", {"controller": feedback, "controls": {"motor": lambda t: t}}),
+    ):
+        with pytest.raises(OsimliteError, match=words):
+            simulate(model, **{"to": 0.2, **choices})
+    with pytest.raises(OsimliteError, match="other sensors or actuators"):
+        simulate(finer, 0.2, controller=other, resume=first)
+    with pytest.raises(OsimliteError, match="no 'motor'; there is flexor and extensor"):
+        simulate(finer, 0.2, controller=feedback)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"DofReflex": {}}, "a controller is needed"),
+        ({"ReflexController": REFLEXES, "fixed_control_step_size": 0}, "control step of 0 s"),
+        ({"ReflexController": REFLEXES, "measure": 1}, "'measure' of a file of a controller is not done here"),
+        ({"CompositeController": {"NoiseControler": {}}}, "'NoiseControler'.*did you mean 'NoiseController'"),
+        ({"CompositeController": {"NoiseController": [{}, {}]}}, "a NoiseController already"),
+        ({"CompositeController": {"NoiseController": {"base_noice": 1}}}, "'base_noice' of a NoiseController"),
+    ],
+)
+def test_what_is_not_done_is_refused(model, given, words) -> None:
+    with pytest.raises(OsimliteError, match=words):
+        simulate(model, 0.01, controller=osimlite.Feedback(given))
+
+
+def test_values_of_nothing_are_refused(model) -> None:
+    feedback = osimlite.Feedback({"ReflexController": REFLEXES}, {"flexor.KP": 1.0})
+    with pytest.raises(OsimliteError, match=r"no parameter 'flexor\.KP'.*did you mean 'flexor-elbow\.KP'"):
+        simulate(model, 0.01, controller=feedback)
+
+
+# ------------------------------------------------------------------------------------------------------------- noise
+@pytest.mark.parametrize(
+    ("counter", "key", "words"),
+    [
+        ((0, 0, 0, 0), (0, 0), (0x6627E8D5, 0xE169C58D)),
+        ((0xFFFFFFFF,) * 4, (0xFFFFFFFF,) * 2, (0x408F276D, 0x41C83B0E)),
+        (
+            (0x243F6A88, 0x85A308D3, 0x13198A2E, 0x03707344),
+            (0xA4093822, 0x299F31D0),
+            (0xD16CFE09, 0x94FDCCEB),
+        ),
+    ],
+)
+def test_philox_is_that_of_its_authors(counter, key, words) -> None:
+    """Their own numbers (Random123, kat_vectors)."""
+    assert philox(*counter, *key) == words
+
+
+def test_noise_is_normal() -> None:
+    drawn = np.array([normal(7, 0, step, number) for step in range(500) for number in range(8)])
+    assert abs(drawn.mean()) < 0.05 and drawn.std() == pytest.approx(1.0, abs=0.05)
+    assert np.mean(np.abs(drawn) < 1.0) == pytest.approx(0.6827, abs=0.03)
+    assert len(np.unique(drawn)) == len(drawn)
+
+
+def noisy(**noise):
+    given = {"CompositeController": {"ReflexController": REFLEXES, "NoiseController": noise}}
+    return osimlite.Feedback(given, {"flexor-elbow.KP": 0.3})
+
+
+def test_noise_is_as_large_as_it_is_asked_for(model) -> None:
+    calm, rough = (
+        simulate(model, 0.2, controller=noisy(base_noise=base, proportional_noise=part)).controller
+        for base, part in ((0.0, 0.0), (0.004, 0.02))
+    )
+    value, drawn = calm["/forceset/flexor"][0], normal(123, 0, 0, 0)
+    assert 0.1 < value < 0.9
+    assert rough["/forceset/flexor"][0] == pytest.approx(value + (0.004 + 0.02 * value) * drawn, abs=1e-12)
+    felt = simulate(model, 0.05, controller=noisy(sensor_noise=0.01, proportional_sensor_noise=0.1)).controller
+    first, place = calm.rows[0], calm.columns.index("elbow.value")
+    width = 0.01 + 0.1 * abs(first[place])
+    assert felt.rows[0, place] == pytest.approx(first[place] + width * normal(123, 1, 0, place), abs=1e-12)
+
+
+def test_seeds_are_exact(model) -> None:
+    """Also of a run that goes on."""
+    runs = [simulate(model, 0.2, controller=noisy(base_noise=0.05, random_seed=seed)) for seed in (1, 1, 2)]
+    assert same(runs[0], runs[1]) and not same(runs[0], runs[2])
+    first = simulate(model, 0.1, controller=noisy(base_noise=0.05, random_seed=1))
+    second = simulate(model, 0.2, controller=noisy(base_noise=0.05, random_seed=1), resume=first)
+    assert np.array_equal(second.states.rows, runs[0].states.rows[10:])
+
+
+def test_noisy_walks_alone_are_those_among_many(tmp_path) -> None:
+    file = write_scenario(tmp_path)
+    text, end = file.read_text(), "CompositeMeasure"
+    inner, measures = text[text.index("GaitStateController") : text.index(end)], text[text.index(end) :]
+    noise = "NoiseController { base_noise = 0.005 proportional_noise = 0.05 random_seed = 5 }"
+    head = text[: text.index("GaitStateController")]
+    file.write_text(f"{head} CompositeController {{ {inner} {noise} }} {measures}")
+    scenario = Scenario(file)
+    best, name = scenario.best(), "S00011.vasti.KF"
+    with pytest.warns(UserWarning, match="numbers depend on the compiler of SCONE"):
+        together = scenario.walk(best | {name: best[name] * np.array([1.0, 1.01])}, 2, duration=1.0)
+        alone = [scenario.walk(best | {name: best[name] * factor}, duration=1.0) for factor in (1.0, 1.01)]
+    assert together.results.tolist() == [walked.results[0] for walked in alone]
+    calm = Scenario(write_scenario(tmp_path / "calm"))
+    assert calm.walk(best, duration=1.0).results[0] != together.results[0]
