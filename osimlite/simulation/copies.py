@@ -16,7 +16,7 @@ from osimlite.multibody.functions import Constant
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.held import places_of
+from osimlite.simulation.given_controls import places_of
 from osimlite.simulation.many import BatchOptions
 from osimlite.simulation.run import Simulation
 

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import SettingError, SimulationError
+from osimlite.kernels.layout import ITEM, MODEL
+from osimlite.kernels.pointers import Ints
 from osimlite.multibody.functions import Constant, Function, Scaled, Univariate
 from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.smoothing_spline import smoothing_spline
@@ -165,3 +167,12 @@ def _lines(name: str, times: Any, values: Any) -> tuple[Function, float, float]:
         raise SettingError(f"the control of '{name}' has times that do not increase, or what is no number; mend it")
     line = Constant(float(y[0])) if len(x) == 1 else smoothing_spline(x, y, 1, 0.0)
     return line, float(x[0]), float(x[-1])
+
+
+def places_of(engine: Any, driven: Controls) -> Ints:
+    """Where the numbers of the model have the last function of each control, a constant."""
+    own, numbers, _ = driven.record()
+    tables = [*own[1 + len(driven.names) :], len(numbers)]
+    last = [own[1 + k] for k in range(len(driven.names))]
+    first = int(engine.structure[engine.structure[MODEL.CONTROLS] + ITEM.NUMBERS])
+    return np.array([first + tables[end] - 1 for end in last], dtype=np.int64)

@@ -9,31 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import floor
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from osimlite.errors import SettingError
-from osimlite.kernels.layout import ITEM, MODEL
 from osimlite.kernels.pointers import Floats, Ints
 from osimlite.kernels.reflexes import EARLY_STANCE, REFLEXES, UNKNOWN
 from osimlite.kernels.senses import SENSES
 from osimlite.kernels.walks import COUNTS, FRAMES, LEGS, STEPS
 from osimlite.multibody.functions import Constant, Function, PiecewiseConstant
 from osimlite.records import dataclass
-from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.given_controls import places_of
 from osimlite.simulation.integrators import INITIAL_STEP
 
 if TYPE_CHECKING:
     from osimlite.simulation.elements.controls import Controls
     from osimlite.simulation.run import Simulation
-    from osimlite.simulation.trajectory import Trajectory
 
 NEAR = 1e-9
 """A time that is so near to the start of a control step, as part of one, is that."""
-STATES, TABLE = "states.sto", "controller.sto"
-"""Files that a run goes on from."""
 
 
 class Controller(Protocol):
@@ -70,6 +66,38 @@ class Held:
         nearest = round(time / self.step) * self.step
         return nearest if abs(nearest - time) < NEAR * self.step else time
 
+    def open_to(self, controls: Controls) -> Controls:
+        """Controls to which the controller adds.
+
+        Raises:
+            SettingError: one is a function of Python, beside which no machine code adds anything.
+        """
+        result = controls.driven({path: Constant(0.0) for path in self.paths})
+        if not isinstance(result.record()[2], str):
+            raise SettingError("beside a controller, controls are numbers or tables, not functions of Python")
+        return result
+
+    def require_known(self, before: StoTable | None, end: float) -> None:
+        """Refuse what was recorded of another controller, or not up to the end of a run (s).
+
+        Raises:
+            SettingError: it is so.
+        """
+        if before is None:
+            raise SettingError(
+                "the run that this one goes on from has left no controller.sto, and so had no controller"
+            )
+        if before.columns != self.columns:
+            raise SettingError("the run that this one goes on from had a controller with other sensors or actuators")
+        if not 0.0 <= end - before.times[-1] < self.step * (1.0 + NEAR):
+            raise SettingError(
+                f"what is known of the controller ends at {before.times[-1]:g} s, the states at {end:g} s"
+            )
+
+    def runs(self, engine: Any, controls: Controls, count: int, to: float, before: StoTable | None = None) -> HeldRuns:
+        """Runs of the model; see `HeldRuns`."""
+        return HeldRuns(self, engine, controls, count, to, before)
+
 
 class HeldRuns:
     """Runs by a controller.
@@ -77,7 +105,7 @@ class HeldRuns:
     Args:
         held: of a model.
         engine: of the model, which is driven by `controls`.
-        controls: in which each of the controller's has a number of its own, see :func:`open_to`.
+        controls: in which each of the controller's has a number of its own, see :meth:`Held.open_to`.
         count: of the runs.
         to: time at which they end, s.
         before: what was recorded of the run that a single one goes on from.
@@ -130,62 +158,11 @@ class HeldRuns:
             rows = np.concatenate([self._before.rows[-kept:], rows])
         return StoTable("controller", times, self.held.columns, rows)
 
-
-def open_to(controls: Controls, held: Held) -> Controls:
-    """Controls to which a controller adds.
-
-    Raises:
-        SettingError: a control is a function of Python, beside which no machine code adds anything.
-    """
-    result = controls.driven({path: Constant(0.0) for path in held.paths})
-    if not isinstance(result.record()[2], str):
-        raise SettingError("beside a controller, controls are numbers or tables, not functions of Python")
-    return result
-
-
-def as_driven(controls: Controls, table: StoTable) -> Controls:
-    """Controls with what a controller has added, as functions of time."""
-    times = tuple(table.times.tolist())
-    added: Mapping[str, Function] = {
-        path: PiecewiseConstant(times, tuple(table[path].tolist())) for path in controls.names if path in table.columns
-    }
-    return controls.driven(added)
-
-
-def places_of(engine: Any, driven: Controls) -> Ints:
-    """Where the numbers of the model have the last function of each control, a constant."""
-    own, numbers, _ = driven.record()
-    tables = [*own[1 + len(driven.names) :], len(numbers)]
-    last = [own[1 + k] for k in range(len(driven.names))]
-    first = int(engine.structure[engine.structure[MODEL.CONTROLS] + ITEM.NUMBERS])
-    return np.array([first + tables[end] - 1 for end in last], dtype=np.int64)
-
-
-def ended(given: str | Path | Trajectory) -> tuple[StoTable, StoTable | None]:
-    """The states of a run, and what was recorded of its controller, from its folder or itself.
-
-    Raises:
-        OsimliteError: there are no states.
-    """
-    if not isinstance(given, str | Path):
-        return given.states, given.controller
-    table = Path(given) / TABLE
-    return read_sto(Path(given) / STATES), read_sto(table) if table.exists() else None
-
-
-def require_same(held: Held | None, before: StoTable | None, end: float) -> None:
-    """Refuse what was recorded of another controller, or not up to the end of a run (s).
-
-    Raises:
-        SettingError: it is so.
-    """
-    if held is None and before is not None:
-        raise SettingError("the run that this one goes on from had a controller; give it, too")
-    if held is None:
-        return
-    if before is None:
-        raise SettingError(f"the run that this one goes on from has left no {TABLE}, and so had no controller")
-    if before.columns != held.columns:
-        raise SettingError("the run that this one goes on from had a controller with other sensors or actuators")
-    if not 0.0 <= end - before.times[-1] < held.step * (1.0 + 1e-9):
-        raise SettingError(f"what is known of the controller ends at {before.times[-1]:g} s, the states at {end:g} s")
+    def added_to(self, controls: Controls) -> Controls:
+        """Controls with what the controller has added in a single run, as functions of time."""
+        table = self.table()
+        times = tuple(table.times.tolist())
+        added: Mapping[str, Function] = {
+            path: PiecewiseConstant(times, tuple(table[path].tolist())) for path in self.held.paths
+        }
+        return controls.driven(added)

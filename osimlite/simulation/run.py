@@ -26,14 +26,13 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import AUTO, engine_factory
 from osimlite.simulation.engines.protocol import Engine, Settings
-from osimlite.simulation.held import HeldRuns, as_driven, ended, open_to, require_same
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, LOOSE, MERSON, check_integrator
 from osimlite.simulation.options import PER_RUN, Options
 from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.run_times import check_step
 from osimlite.simulation.run_times import report_times as report_times
-from osimlite.simulation.start import in_units_of, starting, state_at, state_in, suspect_value
+from osimlite.simulation.start import ended, in_units_of, starting, state_at, state_in, suspect_value
 from osimlite.simulation.states import in_model_order
 from osimlite.simulation.stepper import Observer, Progress, Stepper
 from osimlite.simulation.summary import integration_summary, result_summary, versions
@@ -215,8 +214,10 @@ class Simulation:
                 raise SettingError("a controller needs the steps of an integrator; leave out the fixed step")
             held = chosen.controller.held(self)
             to = held.nearest(to)
-        if chosen.resume is not None:
-            require_same(held, before, start)
+            if chosen.resume is not None:
+                held.require_known(before, start)
+        elif before is not None:
+            raise SettingError("the run that this one goes on from had a controller; give it, too")
         times = report_times(to, chosen.report_interval, start)
         if fixed_step is not None:
             check_step(fixed_step, to)
@@ -256,16 +257,16 @@ class Simulation:
             given["controller"] = str(chosen.controller)
         if chosen.resume is not None:
             given["resume"] = str(chosen.resume)
-        opened = controls if held is None else open_to(controls, held)
+        opened = controls if held is None else held.open_to(controls)
         self.engine.drive(opened)
         y = self.initial_state(initial, initial_speeds, equilibrate=chosen.equilibrate)
         self._require_inertia(y)
         settings = Settings(accuracy, integrator, fixed_step, self.engine.route, chosen.show)
-        runs = None if held is None else HeldRuns(held, self.engine, opened, 1, to, before)
+        runs = None if held is None else held.runs(self.engine, opened, 1, to, before)
         recorder, stepper, states = self._moved(y, replace(settings, held=runs), times, chosen.progress)
         table = None if runs is None else runs.table()
-        if table is not None:
-            controls = as_driven(controls, table)
+        if runs is not None:
+            controls = runs.added_to(controls)
         times = times[: len(states)]
         if times[-1] < stepper.time:
             # Where it was ended, which somebody may want to go on from.

@@ -16,6 +16,7 @@ from osimlite.simulation.files.storage import StoTable, read_sto
 
 if TYPE_CHECKING:
     from osimlite.multibody.parts import CoordinateInfo
+    from osimlite.simulation.trajectory import Trajectory
 
 
 def in_units_of(mechanism: Mechanism, name: str, given: float | str) -> float:
@@ -167,3 +168,15 @@ def state_at(
         path: float(np.radians(row[place])) if table.in_degrees and path.rpartition("/")[0] in turning else row[place]
         for path, place in columns.items()
     }
+
+
+def ended(given: str | Path | Trajectory) -> tuple[StoTable, StoTable | None]:
+    """The states of a run, and what was recorded of its controller, from its folder or itself.
+
+    Raises:
+        OsimliteError: there are no states.
+    """
+    if not isinstance(given, str | Path):
+        return given.states, given.controller
+    table = Path(given) / "controller.sto"
+    return read_sto(Path(given) / "states.sto"), read_sto(table) if table.exists() else None
