@@ -24,6 +24,15 @@ def amount_by_arc(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation
     a = (y[one] if one >= 0 else p[0]) + table[NEUTRAL]
     b = (y[two] if two >= 0 else p[1]) + table[NEUTRAL + 1]
     ua, ub = u[one] if one >= 0 else 0.0, u[two] if two >= 0 else 0.0
+    value, da, db, daa, dab, dbb = arc_at(table, a, b)
+    w[j[OPERATION.GRADIENT]], w[j[OPERATION.GRADIENT] + 1] = da, db
+    kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE] = value, da * ua + db * ub
+    kept[OPERATION_WORK.CURVATURE] = daa * ua * ua + 2.0 * dab * ua * ub + dbb * ub * ub
+    return OUTCOME.OK
+
+
+def arc_at(table: Floats, a: float, b: float) -> tuple[float, float, float, float, float, float]:
+    """Value, derivatives, and second derivatives by a, a; a, b; b, b of a component of the end, at its two angles."""
     sa, ca, sb, cb = sin(a), cos(a), sin(b), cos(b)
     # The cosine of the whole angle, with its derivatives by the two.
     c, ga, gb, haa, hab, hbb = ca * cb, -sa * cb, -ca * sb, -ca * cb, sa * sb, -ca * cb
@@ -42,10 +51,7 @@ def amount_by_arc(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation
     daa = size * (v * oaa + share * vaa + 2.0 * va * oa)
     dab = size * (v * oab + share * vab + va * ob + vb * oa)
     dbb = size * (v * obb + share * vbb + 2.0 * vb * ob)
-    w[j[OPERATION.GRADIENT]], w[j[OPERATION.GRADIENT] + 1] = da, db
-    kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE] = size * v * share, da * ua + db * ub
-    kept[OPERATION_WORK.CURVATURE] = daa * ua * ua + 2.0 * dab * ua * ub + dbb * ub * ub
-    return OUTCOME.OK
+    return size * v * share, da, db, daa, dab, dbb
 
 
 def along_the_arc(table: Floats, cosine: float) -> tuple[float, float, float]:

@@ -1,19 +1,23 @@
 """Functions of coordinates with first and second derivatives, as joints and constraints need them.
 
-The formulas are those of OpenSim's functions of the same names.
+They are OpenSim's functions of the same names, and the kernels evaluate them.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from array import array
 from collections.abc import Sequence
-from itertools import product
+from functools import cached_property
+from itertools import combinations, product
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from osimlite.errors import ModelError
+from osimlite.kernels.functions import MONOMIALS, MONOMIALS_OF_OPENSIM, PIECES, SINE, STEP, several_at, value_at
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 
@@ -26,6 +30,11 @@ class Function(ABC):
         """Return the value, the gradient (k,) and the Hessian (k, k) at `arguments` (k,)."""
 
     @property
+    def table(self) -> Sequence[float]:
+        """The numbers by which the kernels know it, see :mod:`osimlite.kernels.functions`; empty if they do not."""
+        return ()
+
+    @property
     def slope(self) -> float | None:
         """The constant slope of a linear function of one argument, None for every other function."""
         return None
@@ -34,9 +43,10 @@ class Function(ABC):
 class Univariate(Function):
     """A function of one number."""
 
+    @property
     @abstractmethod
-    def _at(self, x: float) -> tuple[float, float, float]:
-        """Return the value and the first two derivatives at `x`."""
+    def table(self) -> Sequence[float]:
+        """The numbers by which the kernels know it."""
 
     def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
         """Value, first and second derivative at the one argument."""
@@ -45,7 +55,55 @@ class Univariate(Function):
 
     def derivatives(self, x: float) -> tuple[float, float, float]:
         """Value, first and second derivative at `x`, all three as plain numbers; NaN where `x` is not finite."""
-        return self._at(x) if math.isfinite(x) else (math.nan, math.nan, math.nan)
+        return self._at(x) if math.isfinite(x) else _NOTHING
+
+    def _at(self, x: float) -> tuple[float, float, float]:
+        numbers: Any = memoryview(self._numbers)
+        try:
+            return value_at(numbers, x)
+        except ValueError:
+            # The sine of what is too large for a float.
+            return _NOTHING
+
+    @cached_property
+    def _numbers(self) -> array[float]:
+        return array("d", self.table)
+
+
+class Multivariate(Function):
+    """A sum of products of powers of several numbers."""
+
+    @property
+    @abstractmethod
+    def table(self) -> Sequence[float]:
+        """The numbers by which the kernels know it."""
+
+    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+        """Value, gradient (k,) and Hessian (k, k)."""
+        size = len(arguments)
+        places: Any = range(size)
+        values: list[float] = arguments.tolist()
+        given, table, gradient = floats(values), floats([*values, *self.table]), floats([0.0] * size)
+
+        def at_rates(*moving: int) -> tuple[float, float]:
+            """Value, and second derivative while some arguments change by 1."""
+            rates = floats([float(k in moving) for k in places])
+            value, _, curvature = several_at(size, places, table, given, rates, gradient)
+            return value, curvature
+
+        value, hessian = at_rates()[0], np.diag([at_rates(k)[1] for k in places]) if size else np.zeros((0, 0))
+        for one, two in combinations(places, 2):
+            both = at_rates(one, two)[1] - hessian[one, one] - hessian[two, two]
+            hessian[one, two] = hessian[two, one] = 0.5 * both
+        return value, np.array(gradient), hessian
+
+
+def floats(numbers: Sequence[float] | bytes) -> Any:
+    """Numbers in a row, for kernels that run as Python: they are read one by one sooner than those of an array."""
+    return memoryview(array("d", numbers))
+
+
+_NOTHING = math.nan, math.nan, math.nan
 
 
 @dataclass(frozen=True)
@@ -59,6 +117,11 @@ class Constant(Function):
         size = len(arguments)
         return self.value, np.zeros(size), np.zeros((size, size))
 
+    @property
+    def table(self) -> Sequence[float]:
+        """One piece."""
+        return _pieces((0.0,), ((self.value,),))
+
 
 @dataclass(frozen=True)
 class Linear(Univariate):
@@ -67,8 +130,10 @@ class Linear(Univariate):
     rate: float = 1.0
     start: float = 0.0
 
-    def _at(self, x: float) -> tuple[float, float, float]:
-        return self.rate * x + self.start, self.rate, 0.0
+    @property
+    def table(self) -> Sequence[float]:
+        """One piece."""
+        return _pieces((0.0,), ((self.start, self.rate),))
 
     @property
     def slope(self) -> float | None:
@@ -85,13 +150,10 @@ class Polynomial(Univariate):
 
     coefficients: tuple[float, ...]
 
-    def _at(self, x: float) -> tuple[float, float, float]:
-        value = first = half_second = 0.0
-        for coefficient in self.coefficients:
-            half_second = half_second * x + first
-            first = first * x + value
-            value = value * x + coefficient
-        return value, first, 2.0 * half_second
+    @property
+    def table(self) -> Sequence[float]:
+        """One piece."""
+        return _pieces((0.0,), (self.coefficients[::-1],))
 
 
 @dataclass(frozen=True)
@@ -103,25 +165,25 @@ class Sine(Univariate):
     phase: float
     offset: float
 
-    def _at(self, x: float) -> tuple[float, float, float]:
-        angle = self.omega * x + self.phase
-        if not math.isfinite(angle):
-            return math.nan, math.nan, math.nan
-        wave = self.amplitude * math.sin(angle)
-        return wave + self.offset, self.amplitude * self.omega * math.cos(angle), -self.omega * self.omega * wave
+    @property
+    def table(self) -> Sequence[float]:
+        """A sine."""
+        return SINE, 1.0, self.amplitude, self.omega, self.phase, self.offset
 
 
 @dataclass(frozen=True)
-class WeightedSum(Function):
+class WeightedSum(Multivariate):
     """The sum of all arguments times their `weights`, plus `start`."""
 
     weights: tuple[float, ...]
     start: float = 0.0
 
-    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
-        """The sum, the weights, and zeros."""
-        weights, size = np.array(self.weights), len(arguments)
-        return float(weights @ arguments) + self.start, weights, np.zeros((size, size))
+    @property
+    def table(self) -> Sequence[float]:
+        """Each argument in a monomial, and none in the last."""
+        size = len(self.weights)
+        powers = np.vstack([np.eye(size), np.zeros(size)]).ravel().tolist()
+        return [MONOMIALS, 1.0, size + 1.0, *self.weights, self.start, *powers]
 
 
 @dataclass(frozen=True)
@@ -133,19 +195,14 @@ class Step(Univariate):
     start_value: float
     end_value: float
 
-    def _at(self, x: float) -> tuple[float, float, float]:
-        rate = 1.0 / (self.end - self.start)
-        t, rise = (x - self.start) * rate, self.end_value - self.start_value
-        if t <= 0.0 or t >= 1.0:
-            return (self.start_value if t <= 0.0 else self.end_value), 0.0, 0.0
-        first = 30.0 * t * t * (1.0 - t) ** 2
-        second = 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
-        value = self.start_value + rise * t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
-        return value, rise * first * rate, rise * second * rate * rate
+    @property
+    def table(self) -> Sequence[float]:
+        """A step."""
+        return STEP, 1.0, self.start, self.end, self.start_value, self.end_value
 
 
 @dataclass(frozen=True)
-class MultivariatePolynomial(Function):
+class MultivariatePolynomial(Multivariate):
     """The sum of `coefficients` times monomials of all arguments."""
 
     coefficients: tuple[float, ...]  # one for each monomial
@@ -170,24 +227,17 @@ class MultivariatePolynomial(Function):
             )
         return cls(tuple(coefficients), powers, opensim_derivatives)
 
+    @property
+    def table(self) -> Sequence[float]:
+        """All monomials."""
+        kind = MONOMIALS_OF_OPENSIM if self.opensim_derivatives else MONOMIALS
+        powers = (float(power) for each in self.powers for power in each)
+        return [kind, 1.0, float(len(self.powers)), *self.coefficients, *powers]
+
     def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
         """Value, gradient (k,) and Hessian (k, k)."""
-        size = len(arguments)
-        powers = np.array(self.powers, dtype=int).reshape(-1, size)
-        value, gradient = self._derivative(arguments, powers, ()), np.zeros(size)
-        hessian = np.zeros((size, size))
-        for i in range(size):
-            gradient[i] = self._derivative(arguments, powers, (i,))
-            for j in range(size):
-                hessian[i, j] = gradient[i] if self.opensim_derivatives else self._derivative(arguments, powers, (i, j))
-        return value, gradient, hessian
-
-    def _derivative(self, arguments: Array, powers: NDArray[np.int_], by: tuple[int, ...]) -> float:
-        factors, left = np.array(self.coefficients), powers.copy()
-        for place in by:
-            factors = factors * left[:, place]
-            left[:, place] = np.maximum(left[:, place] - 1, 0)
-        return float(factors @ np.prod(arguments**left, axis=1))
+        value, gradient, hessian = super().evaluate(arguments)
+        return value, gradient, np.tile(gradient[:, None], len(gradient)) if self.opensim_derivatives else hessian
 
 
 @dataclass(frozen=True)
@@ -202,6 +252,12 @@ class Scaled(Function):
         value, gradient, hessian = self.function.evaluate(arguments)
         return self.scale * value, self.scale * gradient, self.scale * hessian
 
+    @property
+    def table(self) -> Sequence[float]:
+        """That of the function, with another factor."""
+        head, rest = self.function.table[:2], self.function.table[2:]
+        return [head[0], self.scale * head[1], *rest] if head else ()
+
 
 @dataclass(frozen=True)
 class PiecewiseLinear(Univariate):
@@ -209,6 +265,12 @@ class PiecewiseLinear(Univariate):
 
     x: tuple[float, ...]
     y: tuple[float, ...]
+
+    @property
+    def table(self) -> Sequence[float]:
+        """The lines; at a knot the kernels take the one after it, which is not always OpenSim's."""
+        slopes = (np.diff(self.y) / np.diff(self.x)).tolist()
+        return _pieces(self.x[:-1], [*zip(self.y[:-1], slopes, strict=True)])
 
     def _at(self, x: float) -> tuple[float, float, float]:
         k = _interval(self.x, x)
@@ -222,6 +284,11 @@ class PiecewiseConstant(Univariate):
 
     x: tuple[float, ...]
     y: tuple[float, ...]
+
+    @property
+    def table(self) -> Sequence[float]:
+        """The steps; at a knot the kernels take the one after it, which is not always OpenSim's."""
+        return _pieces(self.x, [(y,) for y in self.y])
 
     def _at(self, x: float) -> tuple[float, float, float]:
         return self.y[-1 if x >= self.x[-1] else _interval(self.x, x)], 0.0, 0.0
@@ -259,16 +326,20 @@ class SimmSpline(Univariate):
         """
         return tuple(self._pieces)
 
-    def _at(self, x: float) -> tuple[float, float, float]:
-        last = len(self.x) - 1
-        if x < self.x[0] or x > self.x[last]:
-            k = 0 if x < self.x[0] else last
-            y, slope, _, _ = self._pieces[k]
-            return y + slope * (x - self.x[k]), slope, 0.0
-        k = _interval(self.x, x)
-        y, b, c, d = self._pieces[k]
-        t = x - self.x[k]
-        return y + t * (b + t * (c + t * d)), b + t * (2.0 * c + 3.0 * t * d), 2.0 * c + 6.0 * t * d
+    @property
+    def table(self) -> Sequence[float]:
+        """The pieces, and the lines outside."""
+        first, *_, last = self._pieces
+        # At the last point it still is the piece before it.
+        knots = self.x[0], *self.x[:-1], math.nextafter(self.x[-1], math.inf)
+        return _pieces(knots, [first[:2], *self._pieces[:-1], last[:2]])
+
+
+def _pieces(knots: Sequence[float], pieces: Sequence[Sequence[float]]) -> list[float]:
+    """The table of the polynomials after each knot, from the constant up; the first one goes on before its knot."""
+    width = max(map(len, pieces))
+    rows = [(*piece, *[0.0] * (width - len(piece))) for piece in pieces]
+    return [PIECES, 1.0, float(len(knots)), float(width), *knots, *(x for row in rows for x in row)]
 
 
 def _interval(knots: Sequence[float], x: float) -> int:

@@ -19,18 +19,13 @@ from osimlite.kernels.layout import GRAVITY_AT, MODEL
 from osimlite.kernels.pointers import Floats, Ints, address
 from osimlite.kernels.table import LAW_NUMBERS, own_function
 from osimlite.multibody.constraints import Constraint
+from osimlite.multibody.functions import floats
 from osimlite.multibody.links import LinkPacker, tree_of
 from osimlite.multibody.parts import GROUND
 from osimlite.multibody.spatial import Array
 
 if TYPE_CHECKING:
     from osimlite.multibody.mechanism import Mechanism
-
-
-def floats(numbers: Sequence[float] | bytes) -> Floats:
-    """Numbers in a row: Python reads one by one sooner than those of an array."""
-    vector: Any = memoryview(array("d", numbers))
-    return vector
 
 
 class Program:

@@ -15,6 +15,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite.kernels.functions import PIECES
 from osimlite.multibody.functions import Univariate
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
@@ -31,15 +32,12 @@ class PiecewisePolynomial(Univariate):
     knots: Array
     pieces: Array
 
-    def _at(self, x: float) -> tuple[float, float, float]:
-        k = max(0, int(np.searchsorted(self.knots, x, side="right")) - 1)
-        t = x - float(self.knots[k])
-        value = first = half_second = 0.0
-        for coefficient in self.pieces[k, ::-1].tolist():
-            half_second = half_second * t + first
-            first = first * t + value
-            value = value * t + coefficient
-        return value, first, 2.0 * half_second
+    @property
+    def table(self) -> Sequence[float]:
+        """The pieces."""
+        head = PIECES, 1.0, len(self.knots), self.pieces.shape[1]
+        numbers: list[float] = np.concatenate([head, self.knots, self.pieces.ravel()]).tolist()
+        return numbers
 
 
 def smoothing_spline(x: ArrayLike, y: ArrayLike, half_order: int, error_variance: float) -> PiecewisePolynomial:

@@ -12,9 +12,10 @@ import numpy as np
 from osimlite.errors import SettingError, SimulationError
 from osimlite.kernels.layout import ITEM, MODEL
 from osimlite.kernels.pointers import Ints
-from osimlite.multibody.functions import Constant, Function, Scaled, Univariate
+from osimlite.multibody.functions import Constant, Function, Scaled
 from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.smoothing_spline import smoothing_spline
+from osimlite.multibody.spatial import Array
 from osimlite.quantity import tell
 from osimlite.records import dataclass
 from osimlite.schema.base import Object
@@ -27,17 +28,19 @@ from osimlite.text import did_you_mean, listed
 
 
 @dataclass(frozen=True)
-class Called(Univariate):
+class Called(Function):
     """A function of Python that gives a control for a time (s)."""
 
     function: Callable[[float], float]  # it
     name: str  # of the control, for messages
 
-    def _at(self, x: float) -> tuple[float, float, float]:
+    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+        """The value, and zeros."""
+        x = float(arguments[0])
         value = float(self.function(x))
         if not isfinite(value):
             raise SettingError(f"the control of '{self.name}' is {value} at {x:g} s; give a number")
-        return value, 0.0, 0.0
+        return value, np.zeros(1), np.zeros((1, 1))
 
 
 def driven(controls: Controls, given: Mapping[str, Any] | StoTable | str | Path | None, to: float) -> Controls:

@@ -292,9 +292,9 @@ def test_an_unknown_constraint_is_refused_by_name():
 
 
 def test_a_function_that_is_unknown_is_refused_by_name():
-    class Odd(f.Univariate):
-        def _at(self, x: float) -> tuple[float, float, float]:
-            return x, 1.0, 0.0
+    class Odd(f.Function):
+        def evaluate(self, arguments: Any) -> tuple[float, Any, Any]:
+            return arguments[0], np.ones(1), np.zeros((1, 1))
 
     mechanism = build_mechanism(four_bars())
     with pytest.raises(UnsupportedError, match="the function of '/constraintset/odd' is a Odd"):
