@@ -1,29 +1,36 @@
 """Forces and accelerations of a mechanism.
 
 The equation of motion reads M udot + C = gravity + applied forces, where the generalized forces belong to the
-generalized speeds. With the Jacobians of all mass centres at hand it is Newton's and Euler's equation of every body,
-projected on the speeds (Kane's form); nothing is factored out of the tree, which suits arrays better than recursion.
+generalized speeds. The kernels compute it, see :mod:`osimlite.kernels.dynamics`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from math import sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from osimlite.errors import SimulationError
-from osimlite.kernels.constrained_dynamics import SAFE_MASS, SLIGHT
-from osimlite.kernels.least_squares import ROUNDING
-from osimlite.multibody.kinematics import Kinematics
-from osimlite.multibody.linear import shortest, solutions, stacked
-from osimlite.multibody.spatial import Array, skews
+from osimlite.kernels.constrained_dynamics import constrained_dynamics
+from osimlite.kernels.dynamics import (
+    accelerate,
+    composite_rigid_body,
+    generalized_forces,
+    solve,
+    spatial_inertias_and_bias,
+)
+from osimlite.kernels.layout import LINK_WORK, MODEL, OUTCOME
+from osimlite.kernels.parts import link_work
+from osimlite.kernels.pointers import Floats, at
+from osimlite.multibody.functions import floats
+from osimlite.multibody.kinematics import Kinematics, numbers
+from osimlite.multibody.linear import solutions
+from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 
 if TYPE_CHECKING:
-    from osimlite.multibody.constraints import Constraint
     from osimlite.multibody.mechanism import Mechanism
 
 
@@ -44,113 +51,102 @@ class MassCentres:
 
     state: Kinematics
     masses: Array  # (b,), kg
-    inertias: Array  # about the mass centres (b, 3, 3), kg·m²
     arms: Array  # from the body origins to the mass centres (b, 3), m
-    turning: Array  # from the n speeds to the angular velocities (b, 3, n)
-    moving: Array  # from the n speeds to the velocities of the mass centres (b, 3, n)
 
     @classmethod
     def of(cls, state: Kinematics) -> MassCentres:
         """See a mechanism at `state` from its mass centres."""
-        masses, centres, inertias = state.mechanism.inertial
-        rotations, jacobians = state.rotations[:-1], state.jacobians[:-1]
-        arms = (rotations @ centres[:, :, None])[:, :, 0]
-        turning = jacobians[:, :3]
-        moving = jacobians[:, 3:] - skews(arms) @ turning
-        return cls(state, masses, rotations @ inertias @ rotations.transpose(0, 2, 1), arms, turning, moving)
-
-    def mass_matrix(self) -> Array:
-        """M (n, n) of the kinetic energy ½ uᵀ M u."""
-        matrix = _projected(self.turning, self.inertias @ self.turning)
-        matrix += _projected(self.moving, self.masses[:, None, None] * self.moving)
-        return 0.5 * (matrix + matrix.T)
-
-    def inertia_forces(self, body_accelerations: Array) -> Array:
-        """Generalized forces (n,) that give the bodies these spatial accelerations (b + 1, 6)."""
-        w = self.state.velocities[:-1, :3]
-        alpha, a = body_accelerations[:-1, :3], body_accelerations[:-1, 3:]
-        a_centre = a + np.cross(alpha, self.arms) + np.cross(w, np.cross(w, self.arms))
-        torques = _times(self.inertias, alpha) + np.cross(w, _times(self.inertias, w))
-        return _projected(self.turning, torques) + _projected(self.moving, self.masses[:, None] * a_centre)
-
-    def gravity_forces(self) -> Array:
-        """Generalized forces of gravity (n,)."""
-        weights = self.masses[:, None] * self.state.mechanism.gravity
-        return _projected(self.moving, weights)
-
-    def velocities(self) -> Array:
-        """The velocities of the mass centres in ground (b, 3)."""
-        return self.moving @ self.state.u
+        masses, centres, _ = state.mechanism.inertial
+        return cls(state, masses, (state.rotations[:-1] @ centres[:, :, None])[:, :, 0])
 
     def positions(self) -> Array:
         """The mass centres in ground (b, 3)."""
         return self.state.origins[:-1] + self.arms
 
+    def velocities(self) -> Array:
+        """The velocities of the mass centres in ground (b, 3)."""
+        w, v = np.split(self.state.velocities[:-1], 2, axis=1)
+        return v + np.cross(w, self.arms)
+
     def kinetic_energy(self) -> float:
         """Kinetic energy (J)."""
-        w, v = self.turning @ self.state.u, self.velocities()
-        return 0.5 * float(np.sum(w * _times(self.inertias, w)) + np.sum(self.masses[:, None] * v * v))
+        w, v = self.state.velocities[:-1, :3], self.velocities()
+        return 0.5 * float(np.sum(w * self._spins()) + np.sum(self.masses[:, None] * v * v))
 
     def momentum(self) -> tuple[Array, Array]:
         """Linear momentum (3,) in kg·m/s, and angular momentum (3,) about ground's origin in kg·m²/s."""
         linear = self.masses[:, None] * self.velocities()
-        own = _times(self.inertias, self.turning @ self.state.u)
-        return linear.sum(axis=0), (own + np.cross(self.positions(), linear)).sum(axis=0)
+        return linear.sum(axis=0), (self._spins() + np.cross(self.positions(), linear)).sum(axis=0)
+
+    def _spins(self) -> Array:
+        """The angular momenta of the bodies about their mass centres (b, 3)."""
+        turned = self.state.rotations[:-1]
+        inertias = turned @ self.state.mechanism.inertial[2] @ turned.transpose(0, 2, 1)
+        return (inertias @ self.state.velocities[:-1, :3, None])[:, :, 0]
 
 
-def accelerations(state: Kinematics, applied: Array, constraints: Sequence[Constraint]) -> Array:
-    """Derivatives of the speeds (n,) under gravity, `applied` generalized forces (n,) and constraints.
+def mass_matrix(state: Kinematics) -> Array:
+    """M (n, n) of the kinetic energy ½ uᵀ M u."""
+    program, w = state.program, _weighed(state, np.zeros(3))
+    with numbers(w):
+        composite_rigid_body(program.s, w, floats([0.0] * len(state.q)))
+    return program.mass_matrix(w)
 
-    See :func:`constrained_accelerations`.
+
+def missing_forces(state: Kinematics, udot: Array, gravity: Array) -> Array:
+    """Generalized forces (n,) that give the speeds the derivatives `udot` (n,) against `gravity` (3,)."""
+    program = state.program
+    s, udots = program.s, floats(udot[program.order].tolist())
+    w, missing = _weighed(state, gravity, udots), floats([0.0] * len(udot))
+    with numbers(w):
+        generalized_forces(s, w, missing)
+    return -np.array(missing)[program.freedoms]
+
+
+def _weighed(state: Kinematics, gravity: Array, udot: Floats | None = None) -> Floats:
+    """The work vector with the inertias of the links, and the wrenches that are missing for their accelerations."""
+    s, x, w = state.program.s, state.program.x, floats(state.vectors[0].tobytes())
+    with numbers(w):
+        for link in range(s[MODEL.LINKS]):
+            acceleration = link_work(s, w, link)[LINK_WORK.ACCELERATION + 3 :]
+            # In place of gravity, links are pushed upwards.
+            for k, part in enumerate(gravity.tolist()):
+                acceleration[k] -= part
+        if udot is not None:
+            accelerate(s, w, udot)
+        spatial_inertias_and_bias(s, x, w)
+    return w
+
+
+def accelerations(state: Kinematics, applied: Array) -> Array:
+    """Derivatives of the speeds (n,) under gravity, `applied` generalized forces (n,) and the constraints.
+
+    Equations that follow from others or contradict them are fulfilled in the sense of least squares. Where the mass
+    matrix cannot be divided by, the motion is solved for in the null space of the constraints: they may drive what has
+    no mass.
 
     Raises:
-        SimulationError: a motion that nothing forbids moves no mass.
+        SimulationError: a motion that nothing forbids moves no mass, or something is no number.
     """
-    bodies = MassCentres.of(state)
-    matrix = bodies.mass_matrix()
-    right = applied + bodies.gravity_forces() - bodies.inertia_forces(state.biases)
-    equations = (
-        stacked([constraint.acceleration_equations(state) for constraint in constraints]) if constraints else None
-    )
-    return constrained_accelerations(state.mechanism, matrix, right, equations)
-
-
-def constrained_accelerations(
-    mechanism: Mechanism, matrix: Array, right: Array, equations: tuple[Array, Array] | None
-) -> Array:
-    """Udot (n,) with M udot = f but for forces that make G udot = b.
-
-    Equations that follow from others or contradict them are fulfilled in the sense of least squares. Where M cannot be
-    divided by, the motion is solved for in the null space of G: constraints may drive what has no mass.
-
-    Args:
-        mechanism: whose motion.
-        matrix: M (n, n).
-        right: f (n,).
-        equations: G (m, n) and b (m,), if there are any.
-
-    Raises:
-        SimulationError: a motion that nothing forbids moves no mass.
-    """
-    require_numbers(mechanism, matrix, right, *(equations or ()))
-    if equations is None:
-        return _solve(mechanism, matrix, right, None)
-    rows, values = equations
-    with suppress(np.linalg.LinAlgError):
-        factor = np.linalg.cholesky(matrix)
-        if np.min(factor.diagonal() ** 2 / matrix.diagonal()) > SAFE_MASS:
-            udot = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
-            # What moves nothing by more than rounding binds nothing.
-            binding = np.where(np.abs(rows).max(axis=1, keepdims=True) > ROUNDING, rows, 0.0)
-            weighted = np.linalg.solve(factor, binding.T).T
-            # The second time mends the rounding of the first.
-            for _ in range(2):
-                push = shortest(weighted, values - rows @ udot, SLIGHT * sqrt(len(rows)))
-                udot = udot + np.linalg.solve(factor.T, push)
-            return udot
-    particular, free = solutions(rows, values)
-    reduced = _solve(mechanism, free.T @ matrix @ free, free.T @ (right - matrix @ particular), free)
-    return particular + free @ reduced
+    program, mechanism, size = state.program, state.mechanism, len(state.q)
+    s, w = program.s, _weighed(state, mechanism.gravity)
+    _, y, f = state.vectors
+    derivative = floats([*f[:size], *applied[program.order].tolist()])
+    right = at(derivative, size)
+    with numbers(w):
+        composite_rigid_body(s, w, right)
+    matrix = program.mass_matrix(w)
+    require_numbers(mechanism, matrix, np.array(right), *state.all_equations[1:])
+    status = OUTCOME.SINGULAR_MASS
+    with suppress(ArithmeticError, ValueError):
+        if not size or not program.constraints:
+            status = OUTCOME.OK if solve(s, w, right) < 0 else OUTCOME.SINGULAR_MASS
+        else:
+            status = constrained_dynamics(s, program.heavy, w, y, derivative, 0)
+    udot: Array = np.array(right)[program.freedoms]
+    if status != OUTCOME.OK or (size and not np.isfinite(udot).all()):
+        raise massless(_name_of_massless(mechanism, matrix, state.all_equations.rows))
+    return udot
 
 
 def require_numbers(mechanism: Mechanism, *arrays: Array) -> None:
@@ -166,31 +162,6 @@ def require_numbers(mechanism: Mechanism, *arrays: Array) -> None:
         )
 
 
-def _times(matrices: Array, vectors: Array) -> Array:
-    """Each matrix (b, 3, 3) times its vector (b, 3)."""
-    return (matrices @ vectors[:, :, None])[:, :, 0]
-
-
-def _projected(jacobians: Array, loads: Array) -> Array:
-    """Sum over the bodies of each Jacobian (b, 3, n), transposed, times its load (b, 3) or loads (b, 3, m)."""
-    count, _, size = jacobians.shape
-    flat = jacobians.reshape(3 * count, size)
-    return flat.T @ loads.reshape(3 * count, *loads.shape[2:])
-
-
-def _solve(mechanism: Mechanism, matrix: Array, right: Array, directions: Array | None) -> Array:
-    """Solve with a positive definite matrix whose unknowns are motions along `directions` (n, f)."""
-    if not len(right):
-        return right
-    try:
-        pivots = np.linalg.cholesky(matrix).diagonal() ** 2
-    except np.linalg.LinAlgError:
-        raise massless(_name_of_massless(mechanism, matrix, directions)) from None
-    if np.min(pivots / matrix.diagonal()) < 1e-13 or np.min(matrix.diagonal()) < 1.0 / LARGEST:
-        raise massless(_name_of_massless(mechanism, matrix, directions))
-    return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
-
-
 def massless(coordinate: str) -> SimulationError:
     """The error of a motion that can be as fast as it likes.
 
@@ -203,10 +174,11 @@ def massless(coordinate: str) -> SimulationError:
     )
 
 
-def _name_of_massless(mechanism: Mechanism, matrix: Array, directions: Array | None) -> str:
+def _name_of_massless(mechanism: Mechanism, matrix: Array, rows: Array) -> str:
+    """Name of the coordinate that moves most in the motion which moves least, of those that `rows` (m, n) allow."""
+    _, free = solutions(rows, np.zeros(len(rows)))
+    matrix = free.T @ matrix @ free
     scale = np.sqrt(np.where(matrix.diagonal() > 0.0, matrix.diagonal(), 1.0))
     _, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    motion = vectors[:, 0] / scale
-    if directions is not None:
-        motion = directions @ motion
+    motion = free @ (vectors[:, 0] / scale)
     return mechanism.coordinates[int(np.argmax(np.abs(motion)))].name

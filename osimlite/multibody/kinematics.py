@@ -7,19 +7,35 @@ stack the angular part over the linear part of the body's origin.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from osimlite.kernels.constrained_dynamics import bind
 from osimlite.kernels.layout import LINK_WORK, MODEL, WORK
 from osimlite.kernels.motion import move, place
 from osimlite.kernels.pointers import Floats
+from osimlite.multibody.constraints import Constraint, Equations
 from osimlite.multibody.program import Program, program_of
 from osimlite.multibody.spatial import Array, cross, skew, skews, transform
 
 if TYPE_CHECKING:
     from osimlite.multibody.mechanism import Mechanism
+
+
+Vectors = tuple[Floats, Floats, Floats]
+
+
+@contextmanager
+def numbers(w: Floats) -> Iterator[None]:
+    """Whatever Python cannot compute, as an angle that is infinite, leaves no numbers in a work vector."""
+    try:
+        yield
+    except (ArithmeticError, ValueError):
+        np.frombuffer(w)[WORK.SIZE :] = np.nan
 
 
 class Kinematics:
@@ -41,18 +57,43 @@ class Kinematics:
         return program_of(self.mechanism)
 
     @cached_property
-    def vectors(self) -> tuple[Floats, Floats, Floats]:
-        """Work vector, state, and rates, when the links have been moved; no numbers where they cannot be."""
-        s, x = self.program.s, self.program.x
+    def _unmoved(self) -> Vectors:
         w, y, f = self.program.state(self.q, self.u)
         w[WORK.TIME] = self.time
-        try:
+        return w, y, f
+
+    @cached_property
+    def vectors(self) -> Vectors:
+        """Work vector, state, and rates, when the links have been moved; no numbers where they cannot be."""
+        s, x, (w, y, f) = self.program.s, self.program.x, self._unmoved
+        with numbers(w):
             place(s, x, w, y, f)
             move(s, x, w, y, f)
-        except (ArithmeticError, ValueError):
-            # An angle that is not finite, and the like.
-            np.frombuffer(w)[WORK.SIZE :] = np.nan
         return w, y, f
+
+    def equations(self, constraint: Constraint) -> Equations:
+        """The equations of a constraint."""
+        program = self.program.keeping(constraint)
+        if program is self.program:
+            errors, rows, rates, drifts = self.all_equations
+            first, end, end_position = program.equations_of(constraint)
+            return Equations(errors[first:end_position], rows[first:end], rates[first:end], drifts[first:end])
+        other = Kinematics(self.mechanism, self.q, self.u, self.time)
+        other.program = program
+        return other.equations(constraint)
+
+    @cached_property
+    def all_equations(self) -> Equations:
+        """The equations of all constraints; of those that bind speeds only, the errors mean nothing."""
+        program = self.program
+        if program.has_balls:
+            # Rates of coordinates must be defined.
+            self.mechanism.rate_matrix(self.q)
+        w, y, f = self.vectors if program.has_balls or program.on_bodies else self._unmoved
+        if program.constraints:
+            with numbers(w):
+                bind(program.s, program.x, w, y, f)
+        return program.equations(w)
 
     @cached_property
     def rotations(self) -> Array:

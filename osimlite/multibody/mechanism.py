@@ -268,16 +268,15 @@ class Mechanism:
 
     def mass_matrix(self, q: Values) -> Array:
         """M (n, n) for the generalized speeds."""
-        return MassCentres.of(self.at(q)).mass_matrix()
+        return dynamics.mass_matrix(self.at(q))
 
     def bias(self, q: Values, u: Values) -> Array:
         """C (n,), the velocity-dependent part of M udot + C = gravity + applied forces."""
-        state = self.at(q, u)
-        return MassCentres.of(state).inertia_forces(state.biases)
+        return dynamics.missing_forces(self.at(q, u), self._still, np.zeros(3))
 
     def gravity_forces(self, q: Values) -> Array:
         """Generalized forces of gravity (n,)."""
-        return MassCentres.of(self.at(q)).gravity_forces()
+        return -dynamics.missing_forces(self.at(q), self._still, self.gravity)
 
     def generalized_forces(self, q: Values, body_wrenches: Mapping[str, Wrench]) -> Array:
         """Generalized forces (n,) of wrenches at the origins of bodies or frames, along ground's axes."""
@@ -305,16 +304,15 @@ class Mechanism:
         """
         state = self.at(q, u, time)
         applied = self._applied(state, {} if generalized_forces is None else generalized_forces, body_wrenches or {})
-        return dynamics.accelerations(state, applied, self.constraints)
+        return dynamics.accelerations(state, applied)
 
     def inverse_dynamics(
         self, q: Values, u: Values, udot: Values, body_wrenches: Mapping[str, Wrench] | None = None
     ) -> Array:
         """Generalized forces (n,) that give `udot` against gravity and the wrenches, constraints left aside."""
         state = self.at(q, u)
-        bodies = MassCentres.of(state)
-        needed = bodies.inertia_forces(state.accelerations(self._array(udot, "acceleration")))
-        return needed - bodies.gravity_forces() - self._applied(state, {}, body_wrenches or {})
+        missing = dynamics.missing_forces(state, self._array(udot, "acceleration"), self.gravity)
+        return missing - self._applied(state, {}, body_wrenches or {})
 
     @cached_property
     def total_mass(self) -> float:
@@ -363,6 +361,10 @@ class Mechanism:
     @cached_property
     def _default_speeds(self) -> tuple[float, ...]:
         return tuple(info.default_speed for info in self.coordinates)
+
+    @cached_property
+    def _still(self) -> Array:
+        return np.zeros(len(self.coordinates))
 
     @cached_property
     def _unit(self) -> Array:

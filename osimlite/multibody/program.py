@@ -15,38 +15,42 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite.kernels.layout import GRAVITY_AT, MODEL
+from osimlite.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, GRAVITY_AT, MODEL
 from osimlite.kernels.pointers import Floats, Ints, address
 from osimlite.kernels.table import LAW_NUMBERS, own_function
-from osimlite.multibody.constraints import Constraint
+from osimlite.multibody.constraints import Constraint, Equations
 from osimlite.multibody.functions import floats
-from osimlite.multibody.links import LinkPacker, tree_of
+from osimlite.multibody.links import LinkPacker, Tree, tree_of
 from osimlite.multibody.parts import GROUND
 from osimlite.multibody.spatial import Array
 
 if TYPE_CHECKING:
     from osimlite.multibody.mechanism import Mechanism
 
+_ENDS = CONSTRAINT.FIRST_EQUATION, CONSTRAINT.END_EQUATION, CONSTRAINT.END_POSITION
+
 
 class Program:
     """A mechanism all of whose coordinates are free, packed.
 
     Args:
-        mechanism: what moves.
+        tree: the links, with all coordinates as degrees of freedom.
         constraints: that are kept up.
 
     Attributes:
         s: the integers, with addresses that are good in this process.
         x: the numbers, without gravity.
+        heavy: the numbers, with gravity.
         order: place in the mechanism of the coordinate of each degree of freedom.
         freedoms: degree of freedom of each coordinate.
         links: link of each body, and of ground as the last (b + 1,); -1 for ground.
         frames: each body in its link (b + 1, 4, 4).
+        constraints: number of each constraint, by its identity.
         has_balls: whether some speeds are not the rates of coordinates.
+        on_bodies: whether a constraint speaks of bodies.
     """
 
-    def __init__(self, mechanism: Mechanism, constraints: Sequence[Constraint]) -> None:
-        tree = tree_of(mechanism, range(len(mechanism.coordinates)))
+    def __init__(self, tree: Tree, constraints: Sequence[Constraint]) -> None:
         packer = LinkPacker(tree)
         packer.mechanism_records(constraints)
         ints, order = packer.ints, tree.order
@@ -55,15 +59,45 @@ class Program:
             ints[MODEL.LAWS + LAW_NUMBERS[name]] = address(own_function(name))
         integers: Any = memoryview(array("q", ints))
         self.s: Ints = integers
-        self.x = floats(packer.numbers)
+        self.x, self.heavy = floats(packer.numbers), floats(packer.numbers)
         for k in range(GRAVITY_AT, GRAVITY_AT + 3):
             self.x[k] = 0.0
         self.order, self.has_balls = list(order), bool(packer.balls)
         self.freedoms = np.argsort(order)
+        self.constraints = {id(item): number for number, item in enumerate(constraints)}
+        self.on_bodies = any(item.bodies for item in constraints)
         placements = [*tree.places.placements, tree.places.placement(GROUND)]
         self.links = np.array([item.link for item in placements])
         self.frames = np.array([item.frame for item in placements])
-        self._tree = tree
+        # What has an identity is kept, lest another gets it.
+        self._tree, self._kept = tree, [*constraints]
+        self._others: dict[int, Program] = {}
+
+    def keeping(self, constraint: Constraint) -> Program:
+        """This, if the constraint is one of its own, or the program that has it alone."""
+        if id(constraint) in self.constraints:
+            return self
+        if id(constraint) not in self._others:
+            self._others[id(constraint)] = Program(self._tree, (constraint,))
+        return self._others[id(constraint)]
+
+    def equations_of(self, constraint: Constraint) -> tuple[int, int, int]:
+        """First and end of the equations of a constraint of its own, and the end of those that bind positions."""
+        s = self.s
+        at = s[s[s[MODEL.CONSTRAINED] + CONSTRAINED.CONSTRAINT_AT] + self.constraints[id(constraint)]]
+        return tuple(s[at + k] for k in _ENDS)
+
+    def equations(self, w: Floats) -> Equations:
+        """All equations as they stand in a work vector."""
+        size = len(self.order)
+        if not self.constraints:
+            return Equations(np.zeros(0), np.zeros((0, size)), np.zeros(0), np.zeros(0))
+        h, vector = self.s[self.s[MODEL.CONSTRAINED] :], np.frombuffer(w)
+        count = h[CONSTRAINED.EQUATIONS]
+        rows = vector[h[CONSTRAINED.WORK_ROWS] :][: count * size].reshape(count, size)[:, self.freedoms]
+        places = (CONSTRAINED.WORK_ERRORS, CONSTRAINED.WORK_RATES, CONSTRAINED.WORK_DRIFTS)
+        errors, rates, drifts = (vector[h[place] :][:count].copy() for place in places)
+        return Equations(errors, rows, rates, drifts)
 
     @cached_property
     def still(self) -> NDArray[np.bool_]:
@@ -75,10 +109,29 @@ class Program:
             still[number, list(order[ends[number] : ends[number + 1]])] = False
         return np.asarray(still[self.links])
 
+    @cached_property
+    def _entries(self) -> NDArray[np.int_]:
+        """Row, column, and place in the work vector of each entry of the mass matrix that is not zero (3, k)."""
+        s, entries = self.s, []
+        for freedom in range(len(self.order)):
+            record = s[s[MODEL.DOF_AT] + DOF.SIZE * freedom :]
+            above, place = freedom, record[DOF.ROW]
+            while above >= 0:
+                entries.append((self.order[freedom], self.order[above], place))
+                above, place = s[s[MODEL.DOF_AT] + DOF.SIZE * above + DOF.ABOVE], place + 1
+        return np.array(entries, dtype=int).reshape(-1, 3).T
+
+    def mass_matrix(self, w: Floats) -> Array:
+        """The mass matrix (n, n) as it stands in a work vector."""
+        (rows, columns, places), size = self._entries, len(self.order)
+        matrix = np.zeros((size, size))
+        matrix[rows, columns] = matrix[columns, rows] = np.frombuffer(w)[places]
+        return matrix
+
     def state(self, q: Array, u: Array) -> tuple[Floats, Floats, Floats]:
-        """A work vector for a state, the state, and room for its derivative."""
-        y = floats([*q[self.order].tolist(), *u[self.order].tolist()])
-        return floats(bytes(8 * self.s[MODEL.WORK_SIZE])), y, floats(bytes(8 * len(y)))
+        """A work vector for a state, the state, and its rates, as they are but for balls."""
+        values, speeds = q[self.order].tolist(), u[self.order].tolist()
+        return floats(bytes(8 * self.s[MODEL.WORK_SIZE])), floats([*values, *speeds]), floats([*speeds, *speeds])
 
 
 _programs: WeakKeyDictionary[Mechanism, Program] = WeakKeyDictionary()
@@ -87,5 +140,6 @@ _programs: WeakKeyDictionary[Mechanism, Program] = WeakKeyDictionary()
 def program_of(mechanism: Mechanism) -> Program:
     """The program of a mechanism with its own constraints."""
     if mechanism not in _programs:
-        _programs[mechanism] = Program(mechanism, mechanism.constraints)
+        tree = tree_of(mechanism, range(len(mechanism.coordinates)))
+        _programs[mechanism] = Program(tree, mechanism.constraints)
     return _programs[mechanism]

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
-from osimlite.kernels.constrained_dynamics import SLIGHT
+from osimlite.kernels.constrained_dynamics import SLIGHT, bind
+from osimlite.kernels.layout import LINK_WORK, MODEL
+from osimlite.kernels.parts import link_work
 from osimlite.multibody.body_constraints import carrier
 from osimlite.multibody.constraints import Constraint, Coupler
-from osimlite.multibody.dynamics import MassCentres
+from osimlite.multibody.dynamics import mass_matrix
 from osimlite.multibody.kinematics import Kinematics
 from osimlite.multibody.linear import shortest
+from osimlite.multibody.links import Link, Placement, Places, Tree
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.parts import GROUND
+from osimlite.multibody.program import Program
 from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, replace
+from osimlite.records import dataclass
 from osimlite.schema import constraints as schema
 from osimlite.simulation.constrained import constraints_on
 from osimlite.tools.motion import Motion
@@ -46,7 +52,7 @@ class ConstraintForces:
             rows = np.concatenate(blocks)[:, order].T
             # What has no mass, constraints may drive.
             with suppress(np.linalg.LinAlgError):
-                factor = np.linalg.cholesky(MassCentres.of(state).mass_matrix()[np.ix_(order, order)])
+                factor = np.linalg.cholesky(mass_matrix(state)[np.ix_(order, order)])
                 rows, missing = (np.asarray(np.linalg.solve(factor, item), float) for item in (rows, missing))
             result = shortest(rows, missing, SLIGHT * np.sqrt(rows.shape[1]))
             parts = np.split(result, np.cumsum([len(block) for block in blocks])[:-1])
@@ -54,13 +60,33 @@ class ConstraintForces:
 
     def on_bodies(self, constraint: Constraint, multipliers: Array) -> Array:
         """Moment (N m) and force (N) on each body of a constraint (k, 6), about the body's origin, in ground."""
-        bodies = constraint.bodies
-        # As if the velocities of the bodies were speeds of their own.
-        apart = np.zeros((len(self.state.origins), 6, 6 * len(bodies)))
-        for number, body in enumerate(bodies):
-            apart[body, :, 6 * number : 6 * number + 6] = np.eye(6)
-        rows, _ = constraint.acceleration_equations(replace(self.state, jacobians=apart))
-        return (multipliers @ rows).reshape(-1, 6)
+        mechanism, state = self.state.mechanism, self.state
+        bodies = [body for body in constraint.bodies if body != GROUND]
+        held: Any = constraint
+        program = _apart(mechanism, held)
+        w, y, f = program.state(np.zeros(6 * len(mechanism.bodies)), np.zeros(6 * len(mechanism.bodies)))
+        columns = np.frombuffer(w)[program.s[MODEL.WORK_COLUMN] :]
+        for body in bodies:
+            columns[36 * body : 36 * body + 36] = np.eye(6).ravel()
+            here = np.frombuffer(link_work(program.s, w, body))
+            here[: LINK_WORK.POSITION] = state.rotations[body].ravel()
+            here[LINK_WORK.POSITION : LINK_WORK.VELOCITY] = *state.origins[body], *state.origins[body]
+        bind(program.s, program.x, w, y, f)
+        wrenches = (multipliers @ program.equations(w).rows).reshape(-1, 6)
+        # What pushes ground pushes back at the other bodies.
+        force = -wrenches[bodies, 3:].sum(axis=0)
+        torque = -(wrenches[bodies, :3] + np.cross(state.origins[bodies], wrenches[bodies, 3:])).sum(axis=0)
+        grounded = np.concatenate((torque, force))
+        return np.array([grounded if body == GROUND else wrenches[body] for body in constraint.bodies])
+
+
+@lru_cache
+def _apart(mechanism: Mechanism, constraint: Any) -> Program:
+    """A constraint between bodies whose velocities are speeds of their own, each body a link without a joint."""
+    count = len(mechanism.bodies)
+    links = [Link(GROUND, []) for _ in range(count)]
+    places = Places(mechanism, {}, [Placement(number, np.eye(4)) for number in range(count)])
+    return Program(Tree(links, [*range(0, 6 * count + 1, 6)], tuple(range(6 * count)), places), (constraint,))
 
 
 def recorded(motion: Motion) -> tuple[list[str], Array]:

@@ -96,7 +96,7 @@ def test_urdf_and_coordinates_of_real_models_say_where_bodies_are(corpus_model):
         state = mechanism.at(q)
         for constraint in mechanism.constraints:
             if isinstance(constraint, Coupler) and mechanism.coordinates[constraint.dependent].path not in locked:
-                assert np.abs(constraint.bond(state).errors).max() < 1e-9
+                assert np.abs(constraint.position_errors(state)).max() < 1e-9
 
 
 def test_the_file_tells_what_the_model_says_of_coordinates():

@@ -17,14 +17,39 @@ from osimlite.records import dataclass
 class Moved:
     """A mechanism of b bodies and n coordinates at one state, as :class:`osimlite.multibody.kinematics.Kinematics`."""
 
+    mechanism: Mechanism
+    q: Array
+    u: Array
+    time: float
     rotations: Array
     origins: Array
     jacobians: Array
     velocities: Array
     biases: Array
 
+    def point(self, body: int, station: Array) -> Array:
+        """Position in ground (3,) of a `station` (3,) given in the body's frame."""
+        return self.origins[body] + self.rotations[body] @ station
 
-def kinematics(mechanism: Mechanism, q: Array, u: Array) -> Moved:
+    def point_velocity(self, body: int, station: Array) -> Array:
+        """Velocity in ground (3,) of a `station` (3,) given in the body's frame."""
+        velocity: Array = self.velocities[body]
+        return velocity[3:] + cross(velocity[:3], self.rotations[body] @ station)
+
+    def point_bias(self, body: int, station: Array) -> Array:
+        """Acceleration in ground (3,) of a `station` (3,) of the body while all udot are zero."""
+        arm, w = self.rotations[body] @ station, self.velocities[body][:3]
+        bias: Array = self.biases[body]
+        return bias[3:] + cross(bias[:3], arm) + cross(w, cross(w, arm))
+
+    def point_jacobian(self, body: int, station: Array) -> Array:
+        """Matrix (6, n) from the speeds to the body's angular velocity and the velocity of its `station`."""
+        matrix: Array = self.jacobians[body].copy()
+        matrix[3:] -= skew(self.rotations[body] @ station) @ matrix[:3]
+        return matrix
+
+
+def kinematics(mechanism: Mechanism, q: Array, u: Array, time: float = 0.0) -> Moved:
     """Poses, Jacobians, velocities and velocity-dependent accelerations at `q` (n,) and `u` (n,)."""
     count, size = len(mechanism.bodies), len(q)
     rotations, origins = np.empty((count + 1, 3, 3)), np.zeros((count + 1, 3))
@@ -40,7 +65,8 @@ def kinematics(mechanism: Mechanism, q: Array, u: Array) -> Moved:
         origins[index] = origins[parent] + arm
         blocks[index] = carried(blocks[parent], arm, moved[:, -2])
         blocks[index][:, [*own, size, size + 1]] += moved
-    return Moved(rotations, origins, blocks[:, :, :size], blocks[:, :, size], blocks[:, :, size + 1])
+    parts = blocks[:, :, :size], blocks[:, :, size], blocks[:, :, size + 1]
+    return Moved(mechanism, q, u, time, rotations, origins, *parts)
 
 
 def carrying(mobilizer: Mobilizer, q: Array, u: Array) -> RelativeMotion:
