@@ -3,16 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, reduce
 from typing import Any
 
-from osimlite.backends.symbols import casadi, divide, is_symbol, plain
+from osimlite.backends.symbols import SX, casadi, divide, is_symbol, minus, plain, plus, times
 from osimlite.forces.bezier import FIRST, HEAD, LAST, NODES, SCALE, SECTION, SECTIONS, START, X, Y, curve_value
+from osimlite.kernels.functions import PIECES_OF_OPENSIM, pieces_at
 
 STEPS = 5
 """Of Halley's method in the search for a place: four meet all curves and velocities of damped fibers to rounding."""
 GRID = 2.0**53
 """To whose parts a place is rounded: those of a number from a half to one."""
+
+
+def pieces_on_symbols(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
+    """As :func:`osimlite.kernels.functions.pieces_at`: the piece that counts is chosen before anything is computed."""
+    knots, width = int(plain(table[2])), int(plain(table[3]))
+    if not is_symbol(z):
+        numbers: Any = [plain(number) for number in table[: 4 + knots * (1 + width)]]
+        return pieces_at(numbers, float(plain(z)), kind)
+    below = [SX.binary(casadi.OP_LT, z, table[4 + k]) for k in range(1, knots)]
+    # Of the tests that something counts one holds.
+    beyond = [SX(1.0), *(SX.unary(casadi.OP_NOT, test) for test in below)]
+    here = [SX.binary(casadi.OP_AND, *pair) for pair in zip(beyond, [*below, SX(1.0)], strict=True)]
+
+    def chosen(first: int, step: int) -> Any:
+        parts = [SX.binary(casadi.OP_IF_ELSE_ZERO, test, table[first + k * step]) for k, test in enumerate(here)]
+        return reduce(plus, parts)
+
+    t, value, slope, curvature = minus(z, chosen(4, 1)), 0.0, 0.0, 0.0
+    for k in range(width - 1, -1, -1):
+        curvature = plus(times(curvature, t), slope)
+        slope = plus(times(slope, t), value)
+        value = plus(times(value, t), chosen(4 + knots + k, width))
+    return value, slope, slope if kind == PIECES_OF_OPENSIM else times(2.0, curvature)
 
 
 def curve_value_on_symbols(c: Any, x: Any) -> tuple[Any, Any]:

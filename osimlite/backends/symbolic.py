@@ -11,15 +11,19 @@ from types import FunctionType
 from typing import Any
 
 from osimlite.backends import symbols, ways
-from osimlite.backends.curves import curve_value_on_symbols, damped_velocity_on_symbols
+from osimlite.backends.curves import curve_value_on_symbols, damped_velocity_on_symbols, pieces_on_symbols
 from osimlite.backends.reader import Function, Kernel, name_of, stored
 from osimlite.backends.symbols import COUNTERPARTS, UNSET, NoFormula, Vector
 from osimlite.forces.bezier import curve_value
 from osimlite.forces.millard2012_equilibrium import damped_velocity
 from osimlite.kernels import pointers
+from osimlite.kernels.functions import pieces_at
 from osimlite.kernels.trigonometry import sine_cosine
 
 HELP = {
+    "plus_": symbols.plus,
+    "minus_": symbols.minus,
+    "times_": symbols.times,
     "divide_": symbols.divide,
     "power_": symbols.power,
     "both_": symbols.both,
@@ -35,7 +39,13 @@ HELP = {
 """What the rewritten text calls."""
 
 LEAVING = ast.Return, ast.Break, ast.Continue
-SIGNS: dict[type, str] = {ast.Div: "divide_", ast.Pow: "power_"}
+SIGNS: dict[type, str] = {
+    ast.Add: "plus_",
+    ast.Sub: "minus_",
+    ast.Mult: "times_",
+    ast.Div: "divide_",
+    ast.Pow: "power_",
+}
 
 
 def _at(vector: Any, place: int) -> Any:
@@ -58,6 +68,7 @@ _known: dict[Any, Any] = {
     sine_cosine: symbols.sine_cosine,
     curve_value: curve_value_on_symbols,
     damped_velocity: damped_velocity_on_symbols,
+    pieces_at: pieces_on_symbols,
 }
 """The counterparts of functions that have been asked for."""
 

@@ -32,21 +32,27 @@ def value_at(table: Floats, z: float) -> tuple[float, float, float]:
         t = min(max(t, 0.0), 1.0)
         value = table[4] + rise * t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
     else:
-        knots, width = int(table[2]), int(table[3])
-        low, high = 0, knots
-        while high - low > 1:
-            middle = (low + high) // 2
-            if z < table[4 + middle]:
-                high = middle
-            else:
-                low = middle
-        piece, t = at(table, 4 + knots + low * width), z - table[4 + low]
-        for k in range(width - 1, -1, -1):
-            curvature = curvature * t + slope
-            slope = slope * t + value
-            value = value * t + piece[k]
-        curvature = slope if kind == PIECES_OF_OPENSIM else 2.0 * curvature
+        value, slope, curvature = pieces_at(table, z, kind)
     return factor * value, factor * slope, factor * curvature
+
+
+def pieces_at(table: Floats, z: float, kind: int) -> tuple[float, float, float]:
+    """Likewise of polynomials between knots."""
+    value = slope = curvature = 0.0
+    knots, width = int(table[2]), int(table[3])
+    low, high = 0, knots
+    while high - low > 1:
+        middle = (low + high) // 2
+        if z < table[4 + middle]:
+            high = middle
+        else:
+            low = middle
+    piece, t = at(table, 4 + knots + low * width), z - table[4 + low]
+    for k in range(width - 1, -1, -1):
+        curvature = curvature * t + slope
+        slope = slope * t + value
+        value = value * t + piece[k]
+    return value, slope, slope if kind == PIECES_OF_OPENSIM else 2.0 * curvature
 
 
 def amount_by_one(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:

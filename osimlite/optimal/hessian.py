@@ -55,15 +55,15 @@ class Hessian:
         totals = program._rows_of(w)[program._rows :]
         given = program._end_given(w, totals)
         own, at_ends = multipliers[: program._rows], multipliers[program._rows :]
-        cost, wanted = (np.array(part) for part in program._end_slope(*given))
+        cost, wanted = (part.T for part in program._end_slope(*given))
         of_integrals = factor * cost.ravel()[direct:] + at_ends @ wanted[:, direct:]
         push = program._b.T @ np.concatenate([own, of_integrals])
         parts = []
         for sort, first in zip(program.sorts, program._offsets, strict=False):
             count = sort.rows * len(sort.numbers)
-            each = push[first : first + count].reshape(len(sort.numbers), sort.rows).T
-            parts.append(np.array(sort.curvature(*program._given(sort, w), each)).T.ravel())
-        ends = np.array(program._end_curvature(*given, factor, at_ends))
+            parts.append(sort.curvature(*program._given(sort, w), push[first : first + count])[0].ravel())
+        # It is symmetric.
+        (ends,) = program._end_curvature(*given, np.array(factor), at_ends)
         parts.append(ends[self._ends])
         if self._mixed:
             integrals = program._slopes(w)[3]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -24,6 +26,7 @@ NEAR = 1e-4
 """Of two iterates that violate nothing by more than this the cheaper one is the better."""
 
 
+THREADS = "OPENBLAS_NUM_THREADS"
 NEARLY = {"mu_init": 1e-7, "bound_push": 1e-8, "bound_frac": 1e-8}
 """Of a search that starts near its end: what its barrier costs is no more than the barrier times the bounds."""
 
@@ -135,6 +138,7 @@ def solve(
     if settings.optim_hessian_approximation == "exact":
         options["hess_lag"] = _curved(program, search)
     before = time.perf_counter()
+    _load()
     solver = casadi.nlpsol("moco", "ipopt", search.program_itself, options)
     lower, upper = program.layout.lower, program.layout.upper
     with search.interruptible():
@@ -155,10 +159,23 @@ def solve(
     return Found(w, status, bool(stats["success"]), int(stats["iter_count"]), took)
 
 
+@cache
+def _load() -> None:
+    """Ipopt, whose BLAS asks when it is loaded how many threads it may have: matrices are small, and sums of as many
+    parts as there are cores would be others on each machine."""
+    before = os.environ.get(THREADS)
+    os.environ[THREADS] = before or "1"
+    casadi.load_nlpsol("ipopt")
+    if before is None:
+        del os.environ[THREADS]
+
+
 def _options(program: Program) -> dict[str, Any]:
     """As Moco sets them."""
     settings, options = program.problem.solver, dict[str, Any]()
     options["hessian_approximation"] = settings.optim_hessian_approximation
+    # The same steps; what the update adds is a part of the one matrix, in the place of a dozen of solutions for each.
+    options["limited_memory_aug_solver"] = "extended"
     if len(program.layout.lower) > MANY:
         # METIS orders what hangs together over time in half of what MUMPS takes by its own choice.
         options["mumps_pivot_order"] = 5

@@ -25,6 +25,31 @@ from osimlite.optimal.problem import Problem
 SX: Any = casadi.SX
 
 
+class Buffered:
+    """A function of CasADi on arrays, without what its own call takes to convert them.
+
+    Args:
+        function: of dense matrices.
+    """
+
+    def __init__(self, function: Any) -> None:
+        self._buffer, self._run = function.buffer()
+        self._given = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
+        self._results = [np.zeros(function.size_out(k)[::-1]) for k in range(function.n_out())]
+        for k, array in enumerate(self._given):
+            self._buffer.set_arg(k, array.data)
+        for k, array in enumerate(self._results):
+            if array.size:
+                self._buffer.set_res(k, array.reshape(-1).data)
+
+    def __call__(self, *given: Array) -> list[Array]:
+        """Results, and what is given, have their columns as rows."""
+        for own, array in zip(self._given, given, strict=True):
+            own[:] = array.reshape(-1)
+        self._run()
+        return [array.copy() for array in self._results]
+
+
 class PointFormula:
     """F and its derivatives at a point of one sort, whatever the mesh: those of the mesh, or those between."""
 
@@ -92,17 +117,17 @@ class PointFunction:
         self.projected = formula.projected
         self.labels, self.limits, self.rows = formula.labels, formula.limits, formula.rows
         self.jacobian_rows, self.jacobian_columns = formula.jacobian_entries
-        self.value, self.slope = (each.map(len(numbers)) for each in (formula.value, formula.slope))
+        self.value, self.slope = (Buffered(each.map(len(numbers))) for each in (formula.value, formula.slope))
 
     def at(self, program: Program, w: Array, places: Array, z: Array) -> Array:
         """F (n, rows) at other places (n,), from 0 to 1, with these variables (n, ...)."""
         given = program._given_at(w, places, z)
-        return np.array(self.formula.value.map(len(places))(*given)).T
+        return Buffered(self.formula.value.map(len(places)))(*given)[0]
 
     def make_hessian(self) -> None:
         """The second derivatives are only made if they are asked for."""
         function, (self.hessian_rows, self.hessian_columns) = self.formula.curvature
-        self.curvature = function.map(len(self.numbers))
+        self.curvature = Buffered(function.map(len(self.numbers)))
 
 
 class Program:
@@ -204,14 +229,13 @@ class Program:
         factor = SX.sym("factor")
         self.end_columns = np.concatenate([np.arange(size), layout.places[0], layout.places[last]])
         lagrangian = factor * total + casadi.dot(multipliers, wanted)
-        self._end_value = casadi.Function("E", given, [cost, wanted])
-        self._end_slope = casadi.Function(
-            "dE", given, [casadi.densify(casadi.jacobian(total, both)), casadi.densify(casadi.jacobian(wanted, both))]
-        )
+        self._end_value = Buffered(casadi.Function("E", given, [cost, wanted]))
+        slopes = [casadi.densify(casadi.jacobian(each, both)) for each in (total, wanted)]
+        self._end_slope = Buffered(casadi.Function("dE", given, slopes))
         self._end_pattern = np.array(casadi.DM(casadi.jacobian(wanted, both).sparsity(), 1.0).full(), dtype=bool)
         hessian = casadi.hessian(lagrangian, both)[0]
         self._end_hessian_pattern = np.array(casadi.DM(hessian.sparsity(), 1.0).full(), dtype=bool)
-        self._end_curvature = casadi.Function("HE", [*given, factor, multipliers], [casadi.densify(hessian)])
+        self._end_curvature = Buffered(casadi.Function("HE", [*given, factor, multipliers], [casadi.densify(hessian)]))
         self.labels += self.end_labels
         self.times = np.append(self.times, np.full(len(self.end_labels), np.nan))
         self.lower = np.append(self.lower, [low for low, _ in limits])
@@ -343,13 +367,13 @@ class Program:
 
     # ------------------------------------------------------------------------------------------------- numbers
     def _known(self, times: Array) -> Array:
-        """What the series are made of at times (n,): (3 k + 1, n)."""
+        """What the series are made of at times (n,): (n, 3 k + 1)."""
         key = times.tobytes()
         if key not in self._found:
             if len(self._found) >= 8:
                 self._found.clear()
             values = (np.asarray(series.values(times)) for series in self.problem.series)
-            self._found[key] = np.vstack([times[None], *values])
+            self._found[key] = np.vstack([times[None], *values]).T
         return self._found[key]
 
     def _given(self, sort: PointFunction, w: Array) -> list[Array]:
@@ -359,11 +383,10 @@ class Program:
         """What the function of a point is given at places (n,) with variables z (n, ...)."""
         s = w[: self.layout.shared]
         times = w[0] + places * (w[1] - w[0])
-        return [np.repeat(s[:, None], len(places), 1), z.T, places[None], self._known(times)]
+        return [np.tile(s, len(places)), z, places, self._known(times)]
 
     def _all(self, name: str, w: Array) -> Array:
-        parts = [np.array(getattr(sort, name)(*self._given(sort, w))).T.ravel() for sort in self.sorts]
-        return np.concatenate(parts)
+        return np.concatenate([getattr(sort, name)(*self._given(sort, w))[0].ravel() for sort in self.sorts])
 
     def _rows_of(self, w: Array) -> Array:
         """G and the integrals; Ipopt asks for all that belongs to one w, one after the other."""
@@ -374,13 +397,13 @@ class Program:
     def _end_given(self, w: Array, totals: Array) -> list[Array]:
         known = self._known(w[:2])
         first, last = self.layout.places[0], self.layout.places[-1]
-        return [w[: self.layout.shared], w[first], w[last], totals, known[:, 0], known[:, 1]]
+        return [w[: self.layout.shared], w[first], w[last], totals, known[0], known[1]]
 
     def values(self, w: Array) -> tuple[Array, Array]:
         """The parts of f, and g."""
         rows = self._rows_of(w)
         costs, wanted = self._end_value(*self._end_given(w, rows[self._rows :]))
-        return np.array(costs).ravel(), np.concatenate([rows[: self._rows], np.array(wanted).ravel()])
+        return costs.ravel(), np.concatenate([rows[: self._rows], wanted.ravel()])
 
     def slopes(self, w: Array) -> tuple[Array, Array]:
         """The gradient of f, and the numbers of the Jacobian of g in the order of `jacobian_sparsity`."""
@@ -395,7 +418,7 @@ class Program:
         of = ~self._of_g
         integrals[self._jacobian_rows[of] - self._rows, self._jacobian_columns[of]] = numbers[of]
         totals = self._rows_of(w)[self._rows :]
-        cost, wanted = (np.array(part) for part in self._end_slope(*self._end_given(w, totals)))
+        cost, wanted = (part.T for part in self._end_slope(*self._end_given(w, totals)))
         gradient = cost.ravel()[direct:] @ integrals
         gradient[self.end_columns] += cost.ravel()[:direct]
         ends = wanted[:, direct:] @ integrals

@@ -202,7 +202,7 @@ class _Polynomial:
         count = len(layout.names["states"])
         rates = np.zeros((len(grid.places), count))
         for sort in program.sorts:
-            rates[sort.numbers] = np.array(sort.value(*program._given(sort, w))).T[:, :count]
+            rates[sort.numbers] = sort.value(*program._given(sort, w))[0][:, :count]
         self.rates = rates[points[:, used]]
         self._lines = program.problem.solver.interpolate_control_mesh_interior_points
         self._values = {kind: w[layout.places_of[kind]][points] for kind in KINDS if kind != "slacks"}
