@@ -1,78 +1,193 @@
-"""Studies of Moco, solved: time, iterations and objective beside what Moco 4.6 took (../shared/oracle/moco).
+"""Studies of Moco, solved here and by Moco 4.6 itself in turn: iterations, objective, violations, time.
 
-    python benchmarks/optimal.py [STUDY ...]
+    python benchmarks/optimal.py [--core FOLDER] [--rounds N] [STUDY ...]
 
+FOLDER: sources of opensim-core, or its git directory (``git clone --bare``), for walks and gaits.
 ``benchmarks/refinement.py`` shows what meshes save that are refined where it is needed.
 
-Each study is solved in a process of its own; seconds are those of the processor, with importing and making of all.
+Seconds are those of the processor, medians of the rounds. *Set-up and solve* begins with the files, in a process that
+has loaded its libraries and solved another small study; the *process* is a whole one from its start, which solves one.
+Moco uses one thread (``OPENSIM_MOCO_PARALLEL=0``), as we do: more make its processor time larger. The violation is what
+Moco says of each solution file: its own largest constraint violation where it is the guess, before the first step.
 """
 
 from __future__ import annotations
 
-import gzip
+import argparse
 import json
+import os
+import re
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from statistics import median
 
-MOCO = Path(__file__).resolve().parents[2] / "shared/oracle/moco"
-INVERSE = "squat_inverse-20"
-"""By the tool: its study has six digits of the motion alone."""
-STUDIES = "sliding-100", "pendulum-50", "squat-25", INVERSE
-ONE = """
-import json, sys, time
-import osimlite
-study = osimlite.read_document(sys.argv[1])
+from _moco_studies import CORE, STUDIES, kept
+
+OURS = """
+import json, os, sys, time
+import osimlite, osimlite.optimal.solution
+from osimlite import moco
+hessian, warm = sys.argv[1:]
+if warm:
+    moco.solve(warm)
+before = time.process_time()
 def more(study):
-    study.solver.optim_hessian_approximation = sys.argv[2]
-if len(sys.argv) > 3:
-    model = study.problem.phases.model.model
-    for motion in list(model.components(osimlite.PositionMotion)):
-        model.remove(motion)
-    lowpass = osimlite.TabOpLowPassFilter(cutoff_frequency=6.0)
-    found = osimlite.moco.inverse(
-        osimlite.MocoInverse(
-            model=osimlite.ModelProcessor(model=model),
-            kinematics=osimlite.TableProcessor(filepath=sys.argv[3], operators=[lowpass]),
-            kinematics_allow_extra_columns=True, initial_time=0.0, final_time=1.0, mesh_interval=0.05,
-            convergence_tolerance=1e-4, constraint_tolerance=1e-4, minimize_sum_squared_activations=True,
-        ),
-        more=more,
-    )
-else:
+    if hessian:
+        study.solver.optim_hessian_approximation = hessian
+    if os.path.exists("more.omoco"):
+        added = osimlite.read_document("more.omoco")
+        study.problem.phases.goals += [goal.copy_deep() for goal in added.problem.phases.goals]
+        study.problem.phases.state_infos += [info.copy_deep() for info in added.problem.phases.state_infos]
+        for name in ("optim_convergence_tolerance", "optim_constraint_tolerance", "optim_max_iterations"):
+            setattr(study.solver, name, getattr(added.solver, name))
+if os.path.exists("study.omoco"):
+    study = osimlite.read_document("study.omoco")
     more(study)
-    found = osimlite.moco.solve(study)
-worst = found.violations[0].size if found.violations else 0.0
-print(json.dumps([found.status, found.iterations, found.objective, found.duration, time.process_time(), worst]))
+    found = moco.solve(study)
+elif os.path.exists("track.xml"):
+    found = moco.track(osimlite.read_document("track.xml"), more=more)
+else:
+    found = moco.inverse(osimlite.read_document("inverse.xml"), more=more)
+spent = time.process_time() - before
+found.write("ours.sto")
+print(json.dumps([found.success, found.iterations, found.objective, spent, time.process_time()]))
 """
+THEIRS = """
+import json, os, sys, time
+import opensim as osim
+osim.Logger.setLevelString("Off")
+guess, warm = sys.argv[1:]
+if warm:
+    osim.MocoStudy(warm).solve()
+before = time.process_time()
+if os.path.exists("study.omoco"):
+    study = osim.MocoStudy("study.omoco")
+elif os.path.exists("track.xml"):
+    study = osim.MocoTrack("track.xml").initialize()
+else:
+    study = osim.MocoInverse("inverse.xml").initialize()
+solver = osim.MocoCasADiSolver.safeDownCast(study.updSolver())
+if os.path.exists("more.omoco"):
+    added = osim.MocoStudy("more.omoco")
+    phase = added.updProblem().updPhase(0)
+    said = json.load(open("more.json"))
+    for name in said["goals"]:
+        study.updProblem().addGoal(phase.updGoal(name).clone())
+    for name, bounds in said["states"].items():
+        study.updProblem().setStateInfo(name, bounds)
+    settings = osim.MocoCasADiSolver.safeDownCast(added.updSolver())
+    for name in ("optim_convergence_tolerance", "optim_constraint_tolerance", "optim_max_iterations"):
+        getattr(solver, f"set_{name}")(getattr(settings, f"get_{name}")())
+if guess:
+    solver.setGuessFile(guess)
+    solver.set_optim_max_iterations(0)
+    osim.Logger.setLevelString("Info")
+else:
+    solver.set_verbosity(0)
+solution = study.solve()
+spent = time.process_time() - before
+success = solution.success()
+if solution.isSealed():
+    solution.unseal()
+if not guess:
+    solution.write("theirs.sto")
+print()
+print(json.dumps([success, solution.getNumIterations(), solution.getObjective(), spent, time.process_time()]))
+"""
+STAYS = "bound_push 1e-16\nbound_frac 1e-16\nslack_bound_push 1e-16\nslack_bound_frac 1e-16\nbound_relax_factor 0\n"
+"""Options of Ipopt, by which it does not move a guess away from its bounds."""
 
 
-def main(names: list[str]) -> None:
+def main(names: list[str], core: Path, rounds: int) -> None:
     """Print a table in Markdown."""
-    print("| study | | iterations | objective | largest violation | search, s | all, s | times as fast |")
-    print("|---|---|---|---|---|---|---|---|")
-    for name in names or STUDIES:
-        said = json.loads(gzip.decompress((MOCO / f"{name}.json.gz").read_bytes()))
-        print(f"| {name} | Moco | {said['iterations']} | {said['objective']:.7g} | | {said['cpu']:.3g} | | |")
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / f"{name}.omoco"
-            file.write_bytes(gzip.decompress((MOCO / f"{name}.omoco.gz").read_bytes()))
-            more = []
-            if name == INVERSE:
-                more = [str(Path(folder) / "squat-25.sto")]
-                Path(more[0]).write_bytes(gzip.decompress((MOCO / "squat-25.sto.gz").read_bytes()))
-            for hessian in ("limited-memory", "exact"):
-                done = subprocess.run(
-                    [sys.executable, "-c", ONE, str(file), hessian, *more], capture_output=True, text=True, check=True
-                )
-                status, iterations, objective, search, whole, worst = json.loads(done.stdout.splitlines()[-1])
-                note = "" if status == "Solve_Succeeded" else f" ({status})"
-                print(
-                    f"| | {hessian}{note} | {iterations} | {objective:.7g} | {worst:.1e} | {search:.3g} | {whole:.3g} "
-                    f"| {said['cpu'] / search:.0f} ({said['cpu'] / whole:.1f} with all) |"
-                )
+    print("| study | | iterations | objective | violation | set-up and solve, s | times | process, s | times |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as place:
+        warm = Path(place) / "study.omoco"
+        kept("sliding-100")(Path(place), core)
+        text = warm.read_text(encoding="utf-8")
+        warm.write_text(text.replace("<num_mesh_intervals>100<", "<num_mesh_intervals>5<"), encoding="utf-8")
+        for name in names or STUDIES:
+            folder = Path(place) / name.replace(" ", "_")
+            folder.mkdir()
+            STUDIES[name](folder, core)
+            _say_more(folder)
+            _study(name, folder, str(warm), rounds)
+
+
+def _say_more(folder: Path) -> None:
+    """What SWIG does not show of a phase: names of goals, bounds of states."""
+    if not (folder / "more.omoco").exists():
+        return
+    import osimlite
+
+    phase = osimlite.read_document(folder / "more.omoco").problem.phases
+    said = {
+        "goals": [goal.name for goal in phase.goals],
+        "states": {info.name: list(info.bounds) for info in phase.state_infos},
+    }
+    (folder / "more.json").write_text(json.dumps(said), encoding="utf-8")
+
+
+def _study(name: str, folder: Path, warm: str, rounds: int) -> None:
+    """Solve one in turn, and print its rows."""
+    sides = {"Moco": (THEIRS, ""), "as Moco": (OURS, ""), "exact": (OURS, "exact")}
+    spent: dict[str, list[float]] = {side: [] for side in sides}
+    whole: dict[str, list[float]] = {side: [] for side in sides}
+    said: dict[str, list[float]] = {}
+    missed: dict[str, str] = {}
+    for _ in range(rounds):
+        for side, (code, choice) in sides.items():
+            said[side], _ = _run(code, [choice, warm], folder)
+            spent[side].append(said[side][3])
+            if side == "Moco":
+                # A second one would take minutes; its libraries are loaded before it begins.
+                cold, _ = _run("import json, time, opensim\nprint(json.dumps([time.process_time()]))", [], folder)
+                whole[side].append(cold[0] + said[side][3])
+            else:
+                whole[side].append(_run(code, [choice, ""], folder)[0][4])
+            missed[side] = _violation(folder, "theirs.sto" if side == "Moco" else "ours.sto")
+    for number, side in enumerate(sides):
+        success, iterations, objective, *_ = said[side]
+        note = "" if success else " (not solved)"
+        cells = ["" if number else name, side + note, f"{iterations}", f"{objective:.7g}", missed[side]]
+        for kind in (spent, whole):
+            own = median(kind[side])
+            cells += [f"{own:.3g}", f"{median(kind['Moco']) / own:.1f}" if number else ""]
+        print("|", *(f"{cell} |" for cell in cells), flush=True)
+
+
+def _run(code: str, arguments: list[str], folder: Path) -> tuple[list[float], str]:
+    """The numbers that a script ends with, and all that it prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"OPENSIM_MOCO_PARALLEL": "0"},
+        check=False,
+    )
+    if done.returncode:
+        raise SystemExit(done.stdout[-2000:] + done.stderr[-4000:])
+    found: list[float] = json.loads(done.stdout.splitlines()[-1])
+    return found, done.stdout
+
+
+def _violation(folder: Path, solution: str) -> str:
+    """The largest one that Moco has of a solution file."""
+    (folder / "ipopt.opt").write_text(STAYS, encoding="utf-8")
+    _, log = _run(THEIRS, [solution, ""], folder)
+    (folder / "ipopt.opt").unlink()
+    found = re.search(r"Constraint violation\.+:\s+\S+\s+(\S+)", log)
+    return f"{float(found[1]):.1e}" if found else "?"
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("studies", nargs="*", choices=[[], *STUDIES], default=[])
+    parser.add_argument("--core", type=Path, default=CORE)
+    parser.add_argument("--rounds", type=int, default=1)
+    chosen = parser.parse_args()
+    main(chosen.studies, chosen.core, chosen.rounds)

@@ -24,6 +24,7 @@ from osimlite.schema.moco.goals import MocoControlGoal, MocoInitialActivationGoa
 from osimlite.schema.moco.parts import MocoWeight, MocoWeightSet
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoInverse, MocoStudy
 from osimlite.schema.model import Model
+from osimlite.schema.tools.processors import TabOpUseAbsoluteStateNames
 from osimlite.simulation.files.storage import StoTable
 from osimlite.text import did_you_mean
 
@@ -129,7 +130,10 @@ def _kinematics(asked: Asked, tool: MocoInverse, model: Model) -> tuple[StoTable
     infos = mechanism.coordinates
     names = [f"{info.path}/value" for info in infos]
     states = [*names, *(f"{info.path}/speed" for info in infos)]
-    table = processed_table(asked, tool.kinematics, tool.kinematics, states, mechanism)
+    # OpenSim takes names of coordinates, and of states as they once were, for what they mean.
+    processor = tool.kinematics.copy_deep()
+    processor.operators.append(TabOpUseAbsoluteStateNames())
+    table = processed_table(asked, tool.kinematics, processor, states, mechanism)
     own = [name for name in names if name in table.columns]
     if not own:
         raise asked.wrong(tool, "its kinematics have no column such as " + (names[0] if names else "a coordinate"))

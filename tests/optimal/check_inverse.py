@@ -9,6 +9,7 @@ import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.moco import MocoTrajectory, evaluated, inverse, problem_of_inverse, solve
 from osimlite.optimal.program import Program
+from osimlite.simulation.files.storage import read_sto, write_sto
 from tests.optimal.studies import moco_found, moco_said, study, study_file
 
 NAME = "squat_inverse-20"
@@ -19,7 +20,8 @@ def squat(folder, **choices):
     model = study(folder, NAME).problem.phases.model.model.copy_deep()
     for motion in list(model.components(osimlite.PositionMotion)):
         model.remove(motion)
-    moco_found(folder, "squat-25")
+    if not (folder / "squat-25.sto").exists():
+        moco_found(folder, "squat-25")
     kinematics = osimlite.TableProcessor(
         filepath="squat-25.sto", operators=[osimlite.TabOpLowPassFilter(cutoff_frequency=6.0)]
     )
@@ -71,6 +73,19 @@ def test_meshes_of_given_motions_are_refined(tmp_path):
 def test_columns_that_are_no_states_must_be_allowed(tmp_path):
     with pytest.raises(OsimliteError, match=r"is no state.*set kinematics_allow_extra_columns"):
         problem_of_inverse(squat(tmp_path, kinematics_allow_extra_columns=False), folder=tmp_path)
+
+
+def test_names_of_coordinates_will_do(tmp_path):
+    """As in motions of other tools, in degrees."""
+    made = problem_of_inverse(squat(tmp_path), folder=tmp_path)
+    table = read_sto(tmp_path / "squat-25.sto")
+    names = [name for name in table.columns if name.endswith("/value")]
+    rows = np.rad2deg(np.column_stack([table[name] for name in names]))
+    short = [name.split("/")[-2] for name in names]
+    write_sto(tmp_path / "squat-25.sto", "", table.times, short, rows, in_degrees=True)
+    again = problem_of_inverse(squat(tmp_path), folder=tmp_path)
+    times = np.linspace(0.0, 1.0, 5)
+    assert again.functions.numbers(times) == pytest.approx(made.functions.numbers(times), rel=1e-9, abs=1e-9)
 
 
 def test_setups_are_run_and_tell_the_motion_too(tmp_path):
