@@ -1,4 +1,4 @@
-"""From model to mechanism: a tree of bodies and mobilizers, its kinematics and dynamics in numpy."""
+"""From model to mechanism: a tree of bodies and mobilizers, what the kernels find of it in numpy."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from osimlite.kernels.layout import LINK_WORK, MODEL, WORK
 from osimlite.kernels.motion import move, place
 from osimlite.kernels.pointers import Floats
 from osimlite.multibody.constraints import Constraint, Equations
-from osimlite.multibody.program import Program, program_of
+from osimlite.multibody.program import Program
 from osimlite.multibody.spatial import Array, cross, skew, skews, transform
 
 if TYPE_CHECKING:
@@ -49,12 +49,13 @@ class Kinematics:
     """
 
     def __init__(self, mechanism: Mechanism, q: Array, u: Array, time: float = 0.0) -> None:
-        self.mechanism, self.q, self.u, self.time = mechanism, q, u, time
+        # What follows from them is computed when it is asked for: nobody may change them until then.
+        self.mechanism, self.q, self.u, self.time = mechanism, q.copy(), u.copy(), time
 
     @cached_property
     def program(self) -> Program:
         """The mechanism, packed."""
-        return program_of(self.mechanism)
+        return self.mechanism.program
 
     @cached_property
     def _unmoved(self) -> Vectors:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +24,7 @@ from osimlite.multibody.dynamics import MassCentres, Wrench
 from osimlite.multibody.extremes import methods_of_any_numbers
 from osimlite.multibody.joints import Mobilizer
 from osimlite.multibody.kinematics import Kinematics
+from osimlite.multibody.links import tree_of
 from osimlite.multibody.parts import (
     GROUND,
     CoordinateInfo,
@@ -31,6 +33,7 @@ from osimlite.multibody.parts import (
     MobileBody,
     StationPlacement,
 )
+from osimlite.multibody.program import Program
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass, field, replace
 from osimlite.text import did_you_mean
@@ -340,6 +343,15 @@ class Mechanism:
         return MassCentres.of(self.at(q, u)).momentum()
 
     # --------------------------------------------------------------------------------------------- helpers
+    @cached_property
+    def program(self) -> Program:
+        """The mechanism in the vectors of the kernels."""
+        return Program(tree_of(self, range(len(self.coordinates))), self.constraints)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The program has addresses that are good in this process only.
+        return {name: value for name, value in vars(self).items() if name != "program"}
+
     @cached_property
     def _coordinate_places(self) -> dict[str, int]:
         places = {info.path: index for index, info in enumerate(self.coordinates)}

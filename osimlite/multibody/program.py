@@ -9,8 +9,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
-from weakref import WeakKeyDictionary
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +19,9 @@ from osimlite.kernels.pointers import Floats, Ints, address
 from osimlite.kernels.table import LAW_NUMBERS, own_function
 from osimlite.multibody.constraints import Constraint, Equations
 from osimlite.multibody.functions import floats
-from osimlite.multibody.links import LinkPacker, Tree, tree_of
+from osimlite.multibody.links import LinkPacker, Tree
 from osimlite.multibody.parts import GROUND
 from osimlite.multibody.spatial import Array
-
-if TYPE_CHECKING:
-    from osimlite.multibody.mechanism import Mechanism
 
 _ENDS = CONSTRAINT.FIRST_EQUATION, CONSTRAINT.END_EQUATION, CONSTRAINT.END_POSITION
 
@@ -132,14 +128,3 @@ class Program:
         """A work vector for a state, the state, and its rates, as they are but for balls."""
         values, speeds = q[self.order].tolist(), u[self.order].tolist()
         return floats(bytes(8 * self.s[MODEL.WORK_SIZE])), floats([*values, *speeds]), floats([*speeds, *speeds])
-
-
-_programs: WeakKeyDictionary[Mechanism, Program] = WeakKeyDictionary()
-
-
-def program_of(mechanism: Mechanism) -> Program:
-    """The program of a mechanism with its own constraints."""
-    if mechanism not in _programs:
-        tree = tree_of(mechanism, range(len(mechanism.coordinates)))
-        _programs[mechanism] = Program(tree, mechanism.constraints)
-    return _programs[mechanism]

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import pickle
 
 import numpy as np
 import pytest
@@ -133,3 +134,17 @@ def test_a_wrench_at_a_frame_is_that_of_its_body_moved(case: Case):
 def test_rates_and_speeds_convert_both_ways(case: Case):
     mechanism, q, u, _ = case
     assert mechanism.speeds_from_rates(q, mechanism.coordinate_rates(q, u)) == pytest.approx(u, abs=1e-10)
+
+
+def test_a_mechanism_is_the_same_in_another_process():
+    mechanism = mixed_tree()
+    matrix = mechanism.mass_matrix({})
+    assert np.array_equal(pickle.loads(pickle.dumps(mechanism)).mass_matrix({}), matrix)
+
+
+def test_a_state_stays_as_it_was_asked_for():
+    mechanism = mixed_tree()
+    q = mechanism.values({}).copy()
+    state, expected = mechanism.at(q), mechanism.at(q).origins
+    q += 0.1
+    assert np.array_equal(state.origins, expected)
