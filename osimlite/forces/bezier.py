@@ -137,26 +137,101 @@ def on_section(
         rest: how far x is from the start of the section.
         rounds: steps at most.
     """
-    a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
     goes_on = True
     for _ in range(rounds):
-        # In halves, which a processor computes side by side.
-        v = u * u
-        off = u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
-        run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
-        bend = (b + u * (3.0 * d)) + v * (6.0 * e + u * (10.0 * f))
-        divisor = run * run - off * bend
-        leads_on = divisor > 0.0
-        step = off * run / (divisor if leads_on else 1.0)
-        u = min(max(u - step, 0.0), 1.0) if leads_on else u
-        goes_on = leads_on and not abs(step) < NEAR
+        u, goes_on = nearer_place(c, p, apart, u, rest)
         if not goes_on:
             break
+    y, slope = value_at(c, p, apart, u)
+    return u, goes_on, y, slope
+
+
+def nearer_place(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> tuple[float, bool]:
+    """u after a step, and whether more are wanted; the arguments are those of `on_section`."""
+    a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
+    # In halves, which a processor computes side by side.
+    v = u * u
+    off = u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
+    run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
+    bend = (b + u * (3.0 * d)) + v * (6.0 * e + u * (10.0 * f))
+    divisor = run * run - off * bend
+    leads_on = divisor > 0.0
+    step = off * run / (divisor if leads_on else 1.0)
+    u = min(max(u - step, 0.0), 1.0) if leads_on else u
+    return u, leads_on and not abs(step) < NEAR
+
+
+def value_at(c: Sequence[float], p: int, apart: int, u: float) -> tuple[float, float]:
+    """y and the slope at u; the arguments are those of `on_section`."""
+    a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
     v, q = u * u, p + 5 * apart
     g, h, i, j, k, m = c[q], c[q + apart], c[q + 2 * apart], c[q + 3 * apart], c[q + 4 * apart], c[q + 5 * apart]
     run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
     rise = (h + u * (2.0 * i)) + v * ((3.0 * j + u * (4.0 * k)) + v * (5.0 * m))
-    return u, goes_on, (g + u * h) + v * ((i + u * j) + v * (k + u * m)), rise / run
+    return (g + u * h) + v * ((i + u * j) + v * (k + u * m)), rise / run
+
+
+def missed(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> float:
+    """How far u is from the root; the arguments are those of `on_section`."""
+    a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
+    v = u * u
+    return u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
+
+
+def value_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tuple[float, float]:
+    """y of a curve where ``of_y * y + of_x * x`` is a total, and how far the sum is from that.
+
+    On a section the sum is a polynomial in u, too, which rises with a rising curve and positive factors.
+    """
+    end = end_of_sum(c, of_y, of_x, total)
+    if end > 0:
+        return beyond_sum(c, of_y, of_x, total, end), total - total
+    k, rest, u = first_place_of_sum(c, of_y, of_x, total)
+    # As numbers in a row, which on_section takes.
+    own = (
+        of_y * c[k + Y + 1] + of_x * c[k + X],
+        of_y * c[k + Y + 2] + of_x * c[k + X + 1],
+        of_y * c[k + Y + 3] + of_x * c[k + X + 2],
+        of_y * c[k + Y + 4] + of_x * c[k + X + 3],
+        of_y * c[k + Y + 5] + of_x * c[k + X + 4],
+        c[k + Y],
+        c[k + Y + 1],
+        c[k + Y + 2],
+        c[k + Y + 3],
+        c[k + Y + 4],
+        c[k + Y + 5],
+    )
+    u, _, y, _ = on_section(own, 0, 1, u, rest, ROUNDS)
+    return y, missed(own, 0, 1, u, rest)
+
+
+def end_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> int:
+    """The end of a curve that a sum is beyond, FIRST or LAST; 0 if neither."""
+    if not total >= of_y * c[FIRST + 1] + of_x * c[FIRST]:
+        return FIRST
+    return LAST if total > of_y * c[LAST + 1] + of_x * c[LAST] else 0
+
+
+def beyond_sum(c: Sequence[float], of_y: float, of_x: float, total: float, end: int) -> float:
+    """y beyond an end of a curve."""
+    x, y, slope = c[end], c[end + 1], c[end + 2]
+    return y + slope * ((total - (of_y * y + of_x * x)) / (of_y * slope + of_x))
+
+
+def first_place_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tuple[int, float, float]:
+    """As `first_place` of a sum: its section, how far it is from what it is at its start, and u, roughly."""
+    count, number = int(c[SECTIONS]), 0
+    k = HEAD + count
+    start = of_y * c[k + Y] + of_x * c[k + START]
+    end = of_y * c[LAST + 1] + of_x * c[LAST]
+    while number < count - 1:
+        following = k + SECTION
+        knot = of_y * c[following + Y] + of_x * c[following + START]
+        if not total >= knot:
+            end = knot
+            break
+        k, start, number = following, knot, number + 1
+    return k, total - start, (total - start) / (end - start)
 
 
 def curve_integral(c: Sequence[float], x: float) -> float:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from math import isnan, nan
 from typing import NamedTuple
 
-from osimlite.forces.bezier import curve_integral, curve_value
+from osimlite.forces.bezier import curve_integral, curve_value, value_of_sum
 from osimlite.forces.muscles import (
     SIGNIFICANT,
     MuscleInputs,
@@ -22,10 +22,12 @@ from osimlite.forces.muscles import (
     first_order_activation_slope,
 )
 
-VELOCITY_ROUNDS, LENGTH_ROUNDS = 20, 200
-"""Newton's steps in the search for a velocity, and for an equilibrium."""
+LENGTH_ROUNDS = 200
+"""Newton's steps in the search for an equilibrium."""
 VELOCITY_TOLERANCE = 1e-10
-"""What a velocity may leave of a force that is to be zero, as part of the strength."""
+"""What a velocity may leave of a force that is to be zero, as part of the strength; nearly always it is rounding."""
+NONE, DAMPED, INVERSE, RIGID, SLACK = 0.0, 1.0, 2.0, 3.0, 4.0
+"""What tells the velocity: nothing, a sum with damping, the inverse curve; it is known and tells the force, or is 0."""
 SMALLEST = 2.0**-26
 """Least part of a step, and the step (m) in the other direction where there is none."""
 
@@ -63,7 +65,7 @@ class MillardCurves(NamedTuple):
 class Fibers(NamedTuple):
     """What is known of a muscle; before a curve was asked, its argument stands where its value will."""
 
-    left: float  # steps that the search for the velocity may take yet; 0 at its end, -1 if there is none
+    told_by: float  # see NONE
     velocity: float
     by_velocity: float  # factor of the active force
     active: float  # activation
@@ -89,22 +91,21 @@ def millard2012_equilibrium(
         fiber velocity (m/s), what of the passive force is not by damping (N).
     """
     fibers = fibers_at(now, m)
-    is_found, tendon = fibers.left >= 0.0, 0.0
+    tendon = 0.0
     by_length, _ = curve_value(curves.active, fibers.by_length)
     elastic, _ = curve_value(curves.passive, fibers.by_length)
     if not m.is_rigid:
         tendon, _ = curve_value(curves.tendon, fibers.tendon)
     velocity, by_velocity, by_length, elastic, tendon = fibers_loaded(fibers, m, by_length, elastic, tendon)
-    if m.is_rigid:
-        if fibers.left > 0.0:
-            by_velocity, _ = curve_value(curves.velocity, velocity)
-    elif is_found:
-        if m.damping > 0.0:
-            is_found, velocity, by_velocity = damped_velocity(
-                m, fibers.active, by_length, elastic, tendon, fibers.cos, curves
-            )
-        else:
-            velocity, _ = curve_value(curves.inverse, by_velocity)
+    is_found = fibers.told_by != NONE
+    if fibers.told_by == RIGID:
+        by_velocity, _ = curve_value(curves.velocity, velocity)
+    elif fibers.told_by == DAMPED:
+        is_found, velocity, by_velocity = damped_velocity(
+            m, fibers.active, by_length, elastic, tendon, fibers.cos, curves
+        )
+    elif fibers.told_by == INVERSE:
+        velocity, _ = curve_value(curves.inverse, velocity)
     return muscle_with(fibers, m, is_found, velocity, by_velocity, by_length, elastic, tendon)
 
 
@@ -117,66 +118,60 @@ def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> Fibers:
     fiber = max(fiber, m.smallest)
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
     along_tendon = now.length - fiber * cos
-    left, velocity, tendon = 0.0, 0.0, 0.0
+    told_by, velocity, tendon = DAMPED if m.damping > 0.0 else INVERSE, 0.0, 0.0
     if m.is_rigid:
+        told_by = SLACK
         if along_tendon >= m.slack - SIGNIFICANT:
-            left, velocity = 1.0, now.rate * cos / (m.optimal * m.fastest)
+            told_by, velocity = RIGID, now.rate * cos / (m.optimal * m.fastest)
     else:
-        left, tendon = float(VELOCITY_ROUNDS), along_tendon / m.slack
+        tendon = along_tendon / m.slack
     if not cos > SIGNIFICANT:
-        left = -1.0
+        told_by = NONE
     change = first_order_activation_rate(now.excitation, now.activation, m.rising, m.falling, m.least)
     over = fiber / m.optimal
-    return Fibers(left, velocity, 1.0, active, fiber, cos, over, over, tendon, change)
+    return Fibers(told_by, velocity, 1.0, active, fiber, cos, over, over, tendon, change)
 
 
 def fibers_loaded(
     fibers: Fibers, m: Millard2012Equilibrium, by_length: float, elastic: float, tendon: float
 ) -> tuple[float, float, float, float, float]:
-    """What these curves say: velocity and factor, for the inverse curve, and `by_length` and the two after it."""
+    """What these curves say: velocity, or what tells it, factor of the active force, `by_length` and the two after."""
     velocity, by_velocity = fibers.velocity, 1.0
-    if m.is_rigid or fibers.left < 0.0:
+    if m.is_rigid or fibers.told_by == NONE:
         tendon = 0.0
     elif m.damping > 0.0:
-        velocity = velocity_guess(fibers.active, by_length, elastic, tendon, fibers.cos)
+        velocity = tendon / fibers.cos - elastic
     else:
         velocity = by_velocity = (tendon / fibers.cos - elastic) / (fibers.active * by_length)
     return velocity, by_velocity, by_length, elastic, tendon
 
 
-def fibers_guessed(fibers: Fibers, m: Millard2012Equilibrium, inverse: float) -> tuple[float, float]:
-    """Steps that are left, and the velocity to start from; it is that of fibers without damping."""
-    if m.is_rigid or fibers.left < 0.0:
-        return fibers.left, fibers.velocity
-    if m.damping > 0.0:
-        return fibers.left, min(max(inverse, -1.0), 1.0)
-    return 0.0, inverse
+def fibers_asking(fibers: Fibers, m: Millard2012Equilibrium) -> tuple[int, float, float, float]:
+    """Which of the curves of velocity and its inverse is asked, factors of it and its argument, and what their sum is.
+
+    A curve itself is asked where the first factor is 0 and the second 1.
+    """
+    if fibers.told_by == DAMPED:
+        return 0, fibers.active * fibers.by_length, m.damping, fibers.velocity
+    return 1 if fibers.told_by == INVERSE else 0, 0.0, 1.0, fibers.velocity
 
 
-def fibers_nearer(fibers: Fibers, m: Millard2012Equilibrium, factor: float, slope: float) -> tuple[float, float, float]:
-    """Steps that are left after one, velocity, and factor at the one before."""
-    if m.is_rigid:
-        return 0.0, fibers.velocity, factor
-    is_found, nearer = nearer_velocity(
-        m,
-        fibers.active,
-        fibers.by_length,
-        fibers.elastic,
-        fibers.tendon,
-        fibers.cos,
-        fibers.velocity,
-        factor,
-        slope,
-    )
-    return 0.0 if is_found else -1.0 if fibers.left == 1.0 else fibers.left - 1.0, nearer, factor
+def fibers_moved(fibers: Fibers, m: Millard2012Equilibrium, value: float, missed: float) -> tuple[float, float, float]:
+    """What tells the velocity, it, and factor of the active force, by what the curve says."""
+    if fibers.told_by == DAMPED:
+        is_found, velocity = damped_by(m, fibers.active * fibers.by_length, fibers.velocity, value, missed)
+        return DAMPED if is_found else NONE, velocity, value
+    if fibers.told_by == INVERSE:
+        return INVERSE, value, fibers.by_velocity
+    return fibers.told_by, fibers.velocity, value if fibers.told_by == RIGID else 1.0
 
 
 def muscle_of(
     fibers: Fibers, m: Millard2012Equilibrium
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
-    """What `millard2012_equilibrium` returns, after the search."""
+    """What `millard2012_equilibrium` returns, when the curves were asked."""
     of_curves = fibers.by_length, fibers.elastic, fibers.tendon
-    return muscle_with(fibers, m, fibers.left == 0.0, fibers.velocity, fibers.by_velocity, *of_curves)
+    return muscle_with(fibers, m, fibers.told_by != NONE, fibers.velocity, fibers.by_velocity, *of_curves)
 
 
 def muscle_with(
@@ -287,7 +282,9 @@ def damped_velocity(
     cos: float,
     curves: MillardCurves,
 ) -> tuple[bool, float, float]:
-    """The normalized fiber velocity at which damped fibers bear what the tendon does, by Newton's method.
+    """The normalized fiber velocity at which damped fibers bear what the tendon does.
+
+    OpenSim looks for it by Newton's method, up to a tolerance of 1e-10; here the search is that on a curve.
 
     Args:
         m: the muscle.
@@ -296,46 +293,30 @@ def damped_velocity(
         elastic: passive force.
         tendon: its force.
         cos: of pennation.
-        curves: of the muscle; the search starts from where the inverse one leads.
+        curves: of the muscle.
 
     Returns:
         Whether there is one, the velocity, and the factor of the active force there.
     """
-    velocity, _ = curve_value(curves.inverse, velocity_guess(active, by_length, elastic, tendon, cos))
-    velocity, factor = min(max(velocity, -1.0), 1.0), 0.0
-    for _ in range(VELOCITY_ROUNDS):
-        factor, slope = curve_value(curves.velocity, velocity)
-        is_found, velocity = nearer_velocity(m, active, by_length, elastic, tendon, cos, velocity, factor, slope)
-        if is_found:
-            return True, velocity, factor
-    return False, velocity, factor
+    share, borne = active * by_length, tendon / cos - elastic
+    factor, missed = value_of_sum(curves.velocity, share, m.damping, borne)
+    is_found, velocity = damped_by(m, share, borne, factor, missed)
+    return is_found, velocity, factor
 
 
-def velocity_guess(active: float, by_length: float, elastic: float, tendon: float, cos: float) -> float:
-    """At which factor of the active force the search starts; the arguments are those of `damped_velocity`."""
-    return (tendon / max(cos, 0.01) - elastic) / (max(active, 0.01) * max(by_length, 0.01))
-
-
-def nearer_velocity(
-    m: Millard2012Equilibrium,
-    active: float,
-    by_length: float,
-    elastic: float,
-    tendon: float,
-    cos: float,
-    velocity: float,
-    factor: float,
-    slope: float,
+def damped_by(
+    m: Millard2012Equilibrium, share: float, borne: float, factor: float, missed: float
 ) -> tuple[bool, float]:
-    """A step of Newton's method: whether the velocity is good, and it, or else a better one.
+    """Whether a search for the velocity has found it, and what bears the rest of a load.
 
-    Args: as of `damped_velocity`; the velocity, and the factor of the active force there with its slope.
+    Args:
+        m: the muscle.
+        share: active force at rest.
+        borne: by the fibers, but for their passive force at rest.
+        factor: of the active force.
+        missed: how far the search has ended from the load.
     """
-    passive = m.strength * elastic + m.strength * m.damping * velocity
-    error = (m.strength * (active * by_length * factor) + passive) * cos - tendon * m.strength
-    if abs(error) <= max(VELOCITY_TOLERANCE * m.strength, 100.0 * SIGNIFICANT):
-        return True, velocity
-    return False, velocity - error / (m.strength * (active * by_length * slope + m.damping) * cos)
+    return abs(missed) <= VELOCITY_TOLERANCE, (borne - share * factor) / m.damping
 
 
 def millard2012_energy(

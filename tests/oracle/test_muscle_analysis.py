@@ -52,10 +52,10 @@ CLASSES: dict[str, tuple[type[Muscle], dict[str, Any]]] = {
 }
 
 
-def compare(ours: Path, theirs: Path, tolerance: float = 1e-8, small: float = 1e-8) -> None:
+def compare(ours: Path, theirs: Path, tolerance: float = 1e-8, small: float = 5e-7) -> None:
     """All files are there, with the same words, and numbers that differ by parts of the largest of their columns.
 
-    Fibers in equilibrium have the velocity that the search for that leaves them: what differs is rounding.
+    Velocities of fibers are those that OpenSim's search leaves, up to 1e-10 of the strength; here they are exact.
     """
     assert sorted(path.name for path in ours.iterdir()) == sorted(path.name for path in theirs.iterdir())
     for file in ours.iterdir():

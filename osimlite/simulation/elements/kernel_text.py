@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from inspect import signature
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from osimlite.kernels.condensation import WIDTH
-from osimlite.kernels.curves_abreast import LANES, answer, ask, slope_of, value_of
+from osimlite.kernels.curves_abreast import LANES, answer, ask, ask_sum, missed_of, value_of
 from osimlite.kernels.layout import ITEM
 from osimlite.kernels.written import written
 from osimlite.records import dataclass
@@ -25,13 +25,27 @@ SMALL_CHANGE = 1e-7
 """Of lengths (m), angles, speeds and states, to find derivatives."""
 
 
+SOUGHT_ROUNDS = 4
+"""Of a search for a sum, from between the ends of a section."""
+
+
 class Asked(NamedTuple):
     """A part of a law that follows when curves were asked."""
 
     curves: dict[str, str]  # names of the curves, each with the name of what is known that is its argument
     law: Callable[..., Any]  # given what is known, the first parameter, and the value of each curve
     results: tuple[str, ...]  # names of what it finds
-    slopes: bool = False  # whether it is given the slope after each value
+
+
+class Sought(NamedTuple):
+    """A part of a law that follows when one of some curves was asked, itself or a sum of it and its argument."""
+
+    curves: tuple[str, ...]  # names of the curves
+    # given what is known and the first parameter, tells the number of the curve, factors of it and of its argument, and
+    # what the sum of both is; a curve itself is asked where the first factor is 0 and the second 1
+    asking: Callable[..., Any]
+    law: Callable[..., Any]  # given the same, the value of the curve, and how far a search has missed
+    results: tuple[str, ...]  # names of what it finds
 
 
 class Abreast(NamedTuple):
@@ -40,10 +54,10 @@ class Abreast(NamedTuple):
     The results are those of the law to the last bit.
     """
 
-    known: type[Any]  # named tuple of what the parts find; while the first is positive, the search goes on
+    known: type[Any]  # named tuple of what the parts find
     begin: Callable[..., Any]  # makes it, from what the law is given of the moment, and the first parameter
-    parts: tuple[Asked, ...]
-    search: Asked  # a step of it
+    asked: Asked  # the first part
+    sought: Sought  # the second
     end: Callable[..., Any]  # the results of the law, from what is known and the first parameter
 
 
@@ -130,55 +144,53 @@ class KernelText:
         of_moment = len(self._inputs) + 1 + sum(state.given for state in kind.states)
         told = f"known({', '.join(known.values())}), {arguments[of_moment]}"
         begin = f"{', '.join(known.values())} = {self._call(arguments[: of_moment + 1], 'begin')}"
-        going = f"if {known[made.known._fields[0]]} > 0.0:"
-        *_, last = asks = [self._asking(part, known) for part in (*made.parts, made.search)]
-        last[:] = [going, *(f"    {line}" for line in last)]
-        lines = ["asked = 0", *self._each([*kind.geometry.before, *self._noted(inputs), begin, *asks[0]])]
-        # Whoever has an answer asks for the next at once.
-        ready = ["answer(lanes, asked)", "asked = answered = 0"]
-        for number, part in enumerate(made.parts):
-            lines += [*ready, *self._each([*self._answering(part, f"law_{number}", known, told), *asks[number + 1]])]
-        step = self._answering(made.search, "search", known, told)
-        step = [*ready, *self._each([going, *(f"    {line}" for line in (*step, *last))])]
-        lines += ["while asked > 0:", *(f"    {line}" for line in step)]
+        first, second = made.asked, made.sought
+        *_, curves = kind.terms
+        places, number = {}, self.size - curves.size
+        for name, term in zip(curves.type._fields, curves.terms, strict=True):  # type: ignore[attr-defined]
+            places[name], number = f"i[ITEM.NUMBERS] + {number}", number + term.size
+        count = len(first.curves)
+        asks = [
+            f"ask(x, lanes, asked + {k}, {places[curve]}, {known[name]})"
+            for k, (curve, name) in enumerate(first.curves.items())
+        ]
+        lines = ["asked = 0", *self._each([*kind.geometry.before, *self._noted(inputs), begin, *asks,
+                                           f"asked += {count}"])]  # fmt: skip
+        answers = ", ".join(f"value_of(lanes, {count} * asked + {k})" for k in range(count))
+        place = places[second.curves[-1]]
+        for number, curve in reversed([*enumerate(second.curves[:-1])]):
+            place = f"{places[curve]} if which == {number} else {place}"
+        # Whoever has an answer asks for the next at once, in the room of what is answered.
+        lines += ["answer(lanes, asked, 1)", "asked = 0", *self._each([
+            f"{', '.join(known[name] for name in first.results)} = law({told}, {answers})",
+            f"which, of_curve, of_argument, total = asking({told})",
+            f"place = {place}",
+            "if of_curve == 0.0 and of_argument == 1.0:",
+            "    ask(x, lanes, asked, place, total)",
+            "else:",
+            "    ask_sum(x, lanes, asked, place, of_curve, of_argument, total)",
+            "asked += 1",
+        ])]  # fmt: skip
+        lines += [f"answer(lanes, asked, {SOUGHT_ROUNDS})", "asked = 0"]
+        found = ", ".join(known[name] for name in second.results)
+        ended = [f"{found} = found_law({told}, value_of(lanes, asked), missed_of(lanes, asked))", "asked += 1"]
         end = [f"{', '.join(kind.outputs)} = end({told})"]
         end += self._results(name for name in recorded if name not in inputs)
-        lines += self._each([*end, *kind.geometry.after])
-        most = LANES // max(len(part.curves) for part in (*made.parts, made.search))
-        scope = {f"law_{number}": part.law for number, part in enumerate(made.parts)}
+        lines += self._each([*ended, *end, *kind.geometry.after])
         return self._written(
             ABREAST,
             "run",
             [
                 "lanes, first = at(w, s[run + RUN.ROOM]), s[run + RUN.FIRST]",
                 "while first < s[run + RUN.END]:",
-                f"    end_of_part = min(first + {most}, s[run + RUN.END])",
+                f"    end_of_part = min(first + {LANES // count}, s[run + RUN.END])",
                 *(f"    {line}" for line in lines),
                 "    first = end_of_part",
             ],
-            **scope,
-            **{"known": made.known, "begin": made.begin, "search": made.search.law, "end": made.end},
-            **{"ask": ask, "value_of": value_of, "slope_of": slope_of, "answer": answer},
+            **{"known": made.known, "begin": made.begin, "law": first.law, "asking": second.asking},
+            **{"found_law": second.law, "end": made.end, "ask": ask, "ask_sum": ask_sum, "answer": answer},
+            **{"value_of": value_of, "missed_of": missed_of},
         )
-
-    def _asking(self, part: Asked, known: Mapping[str, str]) -> list[str]:
-        """Ask for the curves of a part."""
-        *_, curves = self.kind.terms
-        places, number = {}, self.size - curves.size
-        for name, term in zip(curves.type._fields, curves.terms, strict=True):  # type: ignore[attr-defined]
-            places[name], number = number, number + term.size
-        asks = enumerate(part.curves.items())
-        return [
-            *(f"ask(x, lanes, asked + {k}, i[ITEM.NUMBERS] + {places[curve]}, {known[at]})" for k, (curve, at) in asks),
-            f"asked += {len(part.curves)}",
-        ]
-
-    def _answering(self, part: Asked, law: str, known: Mapping[str, str], told: str) -> list[str]:
-        """Have the law of a part answer."""
-        kinds, count = ("value_of", "slope_of")[: 1 + part.slopes], len(part.curves)
-        answers = ", ".join(f"{kind}(lanes, answered + {k})" for k in range(count) for kind in kinds)
-        results = ", ".join(known[name] for name in part.results)
-        return [f"{results} = {law}({told}, {answers})", f"answered += {count}"]
 
     def _each(self, lines: Sequence[str]) -> list[str]:
         """Lines about each item of a run; who is told of an item without a solution is told its number."""

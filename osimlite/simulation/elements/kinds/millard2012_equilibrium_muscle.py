@@ -8,10 +8,10 @@ from osimlite.forces.millard2012_equilibrium import (
     Fibers,
     Millard2012Equilibrium,
     MillardCurves,
+    fibers_asking,
     fibers_at,
-    fibers_guessed,
     fibers_loaded,
-    fibers_nearer,
+    fibers_moved,
     millard2012_energy,
     millard2012_equilibrium,
     millard2012_equilibrium_length,
@@ -33,7 +33,7 @@ from osimlite.forces.muscles import SIGNIFICANT, pennation
 from osimlite.schema.muscle_parts import MuscleFirstOrderActivationDynamicModel
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
 from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.elements.kernel_text import Abreast, Asked
+from osimlite.simulation.elements.kernel_text import Abreast, Asked, Sought
 from osimlite.simulation.elements.kind import DeclaredForce, State
 from osimlite.simulation.elements.muscle import SPRING, curve, muscle, require
 from osimlite.simulation.elements.parameters import Fields, Number, Together, positive
@@ -147,15 +147,12 @@ KIND = muscle(
     abreast=Abreast(
         Fibers,
         fibers_at,
-        (
-            Asked(
-                {"active": "by_length", "passive": "by_length", "tendon": "tendon"},
-                fibers_loaded,
-                ("velocity", "by_velocity", "by_length", "elastic", "tendon"),
-            ),
-            Asked({"inverse": "velocity"}, fibers_guessed, ("left", "velocity")),
+        Asked(
+            {"active": "by_length", "passive": "by_length", "tendon": "tendon"},
+            fibers_loaded,
+            ("velocity", "by_velocity", "by_length", "elastic", "tendon"),
         ),
-        Asked({"velocity": "velocity"}, fibers_nearer, ("left", "velocity", "by_velocity"), slopes=True),
+        Sought(("velocity", "inverse"), fibers_asking, fibers_moved, ("told_by", "velocity", "by_velocity")),
         muscle_of,
     ),
     stored=_energy,
