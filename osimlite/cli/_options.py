@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from osimlite.choices import Choice
     from osimlite.document.printer import Numbers as NumberStyle
     from osimlite.multibody.mechanism import Mechanism
+    from osimlite.reflexes.feedback import Feedback
     from osimlite.schema.model import Model
 
 File = Annotated[Path, Argument(help="A model file.", show_default=False)]
@@ -73,6 +74,15 @@ Controls = Annotated[
         "--controls",
         metavar="CONTROLS",
         help="Drive actuators: the file of a table of controls over time, or NAME=VALUE; may be given several times.",
+        show_default=False,
+    ),
+]
+Controller = Annotated[
+    Path | None,
+    Option(
+        "--controller",
+        metavar="FILE",
+        help="Reflexes that drive actuators: a file of a controller or a scenario, .yaml or .scone.",
         show_default=False,
     ),
 ]
@@ -138,6 +148,23 @@ def simulating(*names: str) -> Callable[[], Iterator[Choice]]:
         return (each for each in choices(Options) if not names or each.name in names)
 
     return chosen
+
+
+def feedback(controller: Path | None, par: Path | None) -> Feedback | None:
+    """The controller of a file, if one is given.
+
+    Raises:
+        OsimliteError: it is damaged, or there are parameters without one.
+    """
+    from osimlite.errors import SettingError
+
+    if controller is None:
+        if par is not None:
+            raise SettingError("--par has values for a controller; give that by --controller")
+        return None
+    from osimlite.reflexes.feedback import Feedback
+
+    return Feedback(controller, {} if par is None else par)
 
 
 def results_folder(file: Path, output: Path | None) -> Path:

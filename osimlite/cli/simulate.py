@@ -32,15 +32,7 @@ def simulate(
             metavar="FILE", help="Start from the last row of a file of states; --set says more.", show_default=False
         ),
     ] = None,
-    controller: Annotated[
-        Path | None,
-        Option(
-            "--controller",
-            metavar="FILE",
-            help="Reflexes that drive actuators: a file of a controller or a scenario, .yaml or .scone.",
-            show_default=False,
-        ),
-    ] = None,
+    controller: options.Controller = None,
     par: options.Par = None,
     output: options.Folder = None,
     plot: Annotated[
@@ -68,20 +60,13 @@ def simulate(
     """
     from osimlite._require import require
     from osimlite.document.reader import read
-    from osimlite.errors import SettingError, SimulationError
+    from osimlite.errors import SimulationError
 
     if plot:
         require("matplotlib", extra="plot", purpose="drawing")
     if animate:
         require("PIL", extra="view", purpose="an animation")
-    if par is not None and controller is None:
-        raise SettingError("--par has values for a controller; give that by --controller")
-    model = read(file)
-    feedback = None
-    if controller is not None:
-        from osimlite.reflexes.feedback import Feedback
-
-        feedback = Feedback(controller, {} if par is None else par)
+    model, feedback = read(file), options.feedback(controller, par)
     if controls:
         from osimlite.simulation.given_controls import words_to_controls
     from osimlite.simulation.run import Simulation

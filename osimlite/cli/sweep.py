@@ -54,6 +54,8 @@ def sweep(
     resume: Annotated[bool, Option("--resume", help="Go on with an interrupted sweep.")] = False,
     force: Annotated[bool, Option("--force", help="Replace results that were made with other settings.")] = False,
     controls: options.Controls = None,
+    controller: options.Controller = None,
+    par: options.Par = None,
     interpolation: sweeping.Interpolation = "linear",
     **chosen: Any,
 ) -> None:
@@ -70,7 +72,7 @@ def sweep(
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure) if measure else None,
         to=to, engine=engine, report_interval=report_interval, interpolation=interpolation, is_planted=planted,
-        feet=tuple(foot) if foot else None, **chosen,
+        feet=tuple(foot) if foot else None, controller=options.feedback(controller, par), **chosen,
     )  # fmt: skip
     points = choose(plan.variables, sampler, samples, seed)
     with progress_bar("sweeping", points.count) as progress:

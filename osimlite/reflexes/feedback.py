@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -17,8 +18,8 @@ from osimlite.reflexes.parameters import Parameters, read_par
 from osimlite.reflexes.scenario import OPTIMIZERS, begun, legs_of
 from osimlite.reflexes.settings import Node, read_settings, settings_of
 from osimlite.reflexes.walkers import Felt
+from osimlite.schema.model import Model
 from osimlite.simulation.held import Held
-from osimlite.simulation.run import Simulation
 from osimlite.text import listed, or_known
 
 
@@ -36,6 +37,7 @@ class Feedback:
 
     Attributes:
         step: for which controls are held, s.
+        digest: of all that it is.
 
     Raises:
         DocumentError: it has something that is not done here; its name and line are told.
@@ -64,19 +66,21 @@ class Feedback:
         if isinstance(values, str | Path):
             values = {name: best for name, (best, _, _) in read_par(values).items()}
         self._begun, self._values = known, {**known, **values}
+        told = self._kind, self._node, self.step, self._legs, self._values
+        self.digest = sha256(repr(told).encode()).hexdigest()
         if objective is None:
             top.expect_all_asked("a file of a controller")
 
     def __str__(self) -> str:
         return self._told
 
-    def held(self, simulation: Simulation) -> Held:
-        """What the kernels go by, for a model.
+    def held(self, model: Model, engine: Any) -> Held:
+        """What the kernels go by, for a model with its engine.
 
         Raises:
             OsimliteError: the model has not what a reflex names, or a value belongs to no parameter.
         """
-        felt = Felt(simulation.model, simulation, 1, self.step, self._legs)
+        felt = Felt(model, engine, 1, self.step, self._legs)
         parameters = Parameters(self._values)
         reflexes = Reflexes(self._node, self._kind, felt, parameters)
         for name in self._values:

@@ -14,14 +14,13 @@ from osimlite.kernels.pointers import Ints
 from osimlite.kernels.reflexes import REFLEXES
 from osimlite.kernels.senses import OF_MUSCLES, SENSES
 from osimlite.kernels.walks import COUNTS, STEPS
-from osimlite.multibody.mechanism import GROUND
+from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.copies import Copies
 from osimlite.simulation.elements.contact import PairContact
-from osimlite.simulation.run import Simulation
 from osimlite.text import did_you_mean, listed
 
 SIDES = "_l", "_r"
@@ -58,7 +57,7 @@ class Felt:
 
     Args:
         model: whose.
-        simulation: of it.
+        engine: of it.
         count: of its copies, each of which has numbers of its own.
         step: for which controls are held, s.
         lags: whether control steps begin with the derivative that the one before has ended with.
@@ -76,15 +75,16 @@ class Felt:
     def __init__(
         self,
         model: Model,
-        simulation: Simulation,
+        engine: Any,
         count: int,
         step: float,
         legs: Mapping[str, str],
         *,
         lags: bool = False,
     ) -> None:
-        self.count, self.step, self.mechanism = count, step, simulation.mechanism
-        self._simulation, tree, known = simulation, model.tree(), simulation.forces.controls.names
+        self.count, self.step, self.engine = count, step, engine
+        self.mechanism: Mechanism = engine.mechanism
+        tree, known = model.tree(), engine.forces.controls.names
         # Of an actuator with several controls the path has a number behind.
         owners: list[Any] = [tree.by_path.get(path) or tree.by_path[path.rpartition("_")[0]] for path in known]
         self.order = sorted(range(len(known)), key=lambda k: not isinstance(owners[k], Muscle))
@@ -96,15 +96,14 @@ class Felt:
         self.least, self.most = np.transpose([_bounds(owners[k]) for k in self.order]).reshape(2, -1)
         self.mass = self.mechanism.total_mass
         self.weight = self.mass * float(np.linalg.norm(self.mechanism.gravity))
-        state, infos = simulation.state, self.mechanism.coordinates
-        self.coordinates = [infos[k].name for k in state.order]
+        infos = self.mechanism.coordinates
+        self.coordinates = [infos[k].name for k in engine.order]
         self.legs = self._legs(**legs)
         self.senses, self.known = self._sensing(model, lags=lags)
 
     def _sensing(self, model: Model, *, lags: bool) -> tuple[Ints, Array]:
         """Plan of what is felt, and its numbers; see :mod:`osimlite.kernels.senses`."""
-        engine: Any = self._simulation.engine
-        bodies = self.mechanism.bodies
+        engine, bodies = self.engine, self.mechanism.bodies
         limits: list[int] = []
         for item in model.components(CoordinateLimitForce):
             if item.appliesForce and str(item.coordinate) in self.coordinates:
@@ -151,7 +150,7 @@ class Felt:
         parents = {body.name: names[body.parent] for body in self.mechanism.bodies if body.parent != GROUND}
         at_rest = self.mechanism.at(np.array([info.default_value for info in self.mechanism.coordinates]))
         origins = {name: at_rest.origins[k] for k, name in enumerate(names)}
-        elements = [item for item in self._simulation.forces.elements if isinstance(item, PairContact)]
+        elements = [item for item in self.engine.forces.elements if isinstance(item, PairContact)]
         first = np.cumsum([0, *(len(item.pairs) for item in elements)])
         pairs = {
             item.path.rpartition("/")[2]: range(a, b)
@@ -230,8 +229,7 @@ class Walkers(Felt):
         legs: Mapping[str, str],
     ) -> None:
         self.copies = Copies(model, count, step, accuracy, integrator, longest)
-        self.engine: Any = self.copies.engine
-        super().__init__(model, self.copies.simulation, count, step, legs, lags=integrator in LAGGING)
+        super().__init__(model, self.copies.engine, count, step, legs, lags=integrator in LAGGING)
         others = self.names[len(self.muscles) :]
         if others:
             raise ModelError(f"{listed(others)} are no muscles, and efforts of muscles alone are known")

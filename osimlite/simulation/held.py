@@ -7,7 +7,7 @@ the table and the state at a control step goes on to the last bit as if it had n
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import floor
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -25,8 +25,8 @@ from osimlite.simulation.given_controls import places_of
 from osimlite.simulation.integrators import INITIAL_STEP
 
 if TYPE_CHECKING:
+    from osimlite.schema.model import Model
     from osimlite.simulation.elements.controls import Controls
-    from osimlite.simulation.run import Simulation
 
 NEAR = 1e-9
 """A time that is so near to the start of a control step, as part of one, is that."""
@@ -35,8 +35,10 @@ NEAR = 1e-9
 class Controller(Protocol):
     """What drives actuators by what it feels, such as :class:`osimlite.Feedback`."""
 
-    def held(self, simulation: Simulation) -> Held:
-        """What the kernels go by."""
+    digest: str  # of all that it is
+
+    def held(self, model: Model, engine: Any) -> Held:
+        """What the kernels go by, for a model with its engine."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,20 +96,26 @@ class Held:
                 f"what is known of the controller ends at {before.times[-1]:g} s, the states at {end:g} s"
             )
 
-    def runs(self, engine: Any, controls: Controls, count: int, to: float, before: StoTable | None = None) -> HeldRuns:
-        """Runs of the model; see `HeldRuns`."""
-        return HeldRuns(self, engine, controls, count, to, before)
+    def runs(
+        self,
+        engine: Any,
+        controls: Controls,
+        to: float = 0.0,
+        before: StoTable | None = None,
+        others: Sequence[Held] = (),
+    ) -> HeldRuns:
+        """A run of the model, and of others; see `HeldRuns`."""
+        return HeldRuns((self, *others), engine, controls, to, before)
 
 
 class HeldRuns:
     """Runs by a controller.
 
     Args:
-        held: of a model.
-        engine: of the model, which is driven by `controls`.
+        helds: of the models of all runs, which differ in numbers only.
+        engine: of one of the models, which is driven by `controls`.
         controls: in which each of the controller's has a number of its own, see :meth:`Held.open_to`.
-        count: of the runs.
-        to: time at which they end, s.
+        to: time at which a single run ends, which is recorded, s.
         before: what was recorded of the run that a single one goes on from.
 
     Attributes:
@@ -116,8 +124,9 @@ class HeldRuns:
     """
 
     def __init__(
-        self, held: Held, engine: Any, controls: Controls, count: int, to: float, before: StoTable | None = None
+        self, helds: Sequence[Held], engine: Any, controls: Controls, to: float, before: StoTable | None
     ) -> None:
+        held, count = helds[0], len(helds)
         self.held, self._before, self.next_step = held, before, INITIAL_STEP
         plan, senses = held.plan.copy(), held.senses
         driven = places_of(engine, controls)[[controls.names.index(path) for path in held.paths]]
@@ -127,10 +136,10 @@ class HeldRuns:
         self._progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
         if before is not None:
             self._go_on(plan, before)
-        if count == 1:
+        if to > 0.0:
             plan[REFLEXES.ROWS] = held.steps_in(to) + 2 - plan[REFLEXES.FIRST]
         self._record, self._plan = np.empty((plan[REFLEXES.ROWS], len(held.columns))), plan
-        known, numbers = (np.tile(given, (count, 1)) for given in (held.known, held.numbers))
+        known, numbers = np.stack([each.known for each in helds]), np.concatenate([each.numbers for each in helds])
         self.parts = (
             *(senses, known, driven, plan, numbers),
             *(self._room, rows, self._excitations, self._record, self._progress),

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from numpy.typing import ArrayLike
 
@@ -26,6 +26,9 @@ from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.engines.protocol import Engine
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, NO_BOUNDS, check_integrator
 from osimlite.simulation.runs import Floats, Ints, Runs, Watch
+
+if TYPE_CHECKING:
+    from osimlite.simulation.held import Held
 
 __all__ = ["ENDINGS", "BatchEngine", "BatchOptions", "Renewal", "Renewed", "Runs", "Watch", "run_many"]
 
@@ -50,6 +53,8 @@ class BatchOptions:
     most_tries: int = NO_LIMIT  # steps that a run may try
     threads: int | None = None  # how many work; by default one for each core
     step_bounds: tuple[float, float] = NO_BOUNDS  # of the steps, see `Settings`
+    # of a controller of each run; the last function of each of its controls is a constant
+    held: Sequence[Held] = ()
 
     def check(self) -> None:
         """SettingError for what has no meaning; machine code might go on with it forever."""

@@ -212,7 +212,7 @@ class Simulation:
         if chosen.controller is not None:
             if fixed_step is not None:
                 raise SettingError("a controller needs the steps of an integrator; leave out the fixed step")
-            held = chosen.controller.held(self)
+            held = chosen.controller.held(self.model, self.engine)
             to = held.nearest(to)
             if chosen.resume is not None:
                 held.require_known(before, start)
@@ -262,7 +262,7 @@ class Simulation:
         y = self.initial_state(initial, initial_speeds, equilibrate=chosen.equilibrate)
         self._require_inertia(y)
         settings = Settings(accuracy, integrator, fixed_step, self.engine.route, chosen.show)
-        runs = None if held is None else held.runs(self.engine, opened, 1, to, before)
+        runs = None if held is None else held.runs(self.engine, opened, to, before)
         recorder, stepper, states = self._moved(y, replace(settings, held=runs), times, chosen.progress)
         table = None if runs is None else runs.table()
         if runs is not None:

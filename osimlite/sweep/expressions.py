@@ -65,6 +65,9 @@ class Expression:
         text: as above.
         engine: of a model of the structure that the others have.
 
+    Attributes:
+        names: of what it looks at.
+
     Raises:
         SettingError: it is no expression, or names what is not there.
     """
@@ -74,6 +77,7 @@ class Expression:
         names = sorted(map(re.escape, known), key=len, reverse=True)
         calls = "|".join([*REDUCTIONS, *FUNCTIONS])
         self._quantities: list[Quantity] = []
+        self.names: set[str] = set()
 
         def named(found: re.Match[str]) -> str:
             if found["call"] or found["number"]:
@@ -83,6 +87,7 @@ class Expression:
                     f"the measure '{text}' has no '{found[0]}' to look at{did_you_mean(found[0], known)}"
                 )
             self._quantities.append(known[found[0]])
+            self.names.add(found[0])
             return f"_{len(self._quantities) - 1}"
 
         marks = rf"(?P<call>\b({calls})(?=\s*\())|(?P<name>(?<!\w)({'|'.join(names)})(?![\w.]))"
@@ -161,6 +166,12 @@ def quantities(engine: Any) -> Mapping[str, Quantity]:
     more += [(label, partial(_force, number)) for number, label in enumerate(engine.columns)]
     more += [(label, partial(_probe, number)) for number, label in enumerate(probe_labels(engine.probes))]
     return dict(reversed(more)) | result
+
+
+def driven_names(engine: Any) -> set[str]:
+    """Names of what depends on the controls of that moment, besides on the state."""
+    controls = {f"{name}/control" for path in engine.forces.controls.names for name in (path, path.rpartition("/")[2])}
+    return controls | {*engine.columns, *probe_labels(engine.probes)}
 
 
 def _state(place: int, engine: Any, moments: Moments) -> Floats:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from math import isfinite
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from osimlite.document.printer import to_text
 from osimlite.document.reader import read_text
@@ -26,6 +26,9 @@ from osimlite.sweep.controls import Control, check_nodes, controller_of
 from osimlite.sweep.measures import is_expression, measure_name
 from osimlite.sweep.variables import Parameter, Range, Variable, variables
 from osimlite.text import did_you_mean
+
+if TYPE_CHECKING:
+    from osimlite.simulation.held import Controller
 
 Maker = Callable[[Mapping[str, float]], Model]
 """Makes a model from the values of some of its parameters."""
@@ -77,6 +80,7 @@ class Plan:
     skip_unsupported: bool = False  # leave out forces that cannot be computed
     make: Maker | None = None  # makes the model from parameters, where some of them are varied
     folder: str | None = None  # of the model's file, where the files are that it names
+    controller: Controller | None = None  # what drives actuators by what it feels
 
     def model(self) -> Model:
         """The model, with none of the variables set."""
@@ -147,6 +151,7 @@ class Plan:
             "integrator": self.integrator,
             "wrapping": self.wrapping,
             "skip_unsupported": self.skip_unsupported,
+            **({} if self.controller is None else {"controller": self.controller.digest}),
         }
 
 

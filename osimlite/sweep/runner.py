@@ -12,7 +12,8 @@ from osimlite.errors import OsimliteError, SettingError
 from osimlite.records import dataclass, replace
 from osimlite.simulation.run_times import report_times
 from osimlite.simulation.runs import Runs, Watch
-from osimlite.sweep.measures import Batch, Measure, State, measure, measure_name
+from osimlite.sweep.expressions import Expression, driven_names
+from osimlite.sweep.measures import Batch, Measure, State, is_expression, measure, measure_name
 from osimlite.sweep.plan import MOST_TRIES, Plan
 from osimlite.sweep.variables import Floats
 from osimlite.sweep.variants import MOST_KEPT, Variant, Variants
@@ -70,6 +71,13 @@ class _Look:
 
     def __init__(self, plan: Plan, engine: Any) -> None:
         self.measures = [measure(spec, engine, plan.feet) for spec in plan.measures]
+        expressions = [spec for spec in plan.measures if plan.controller is not None and is_expression(spec)]
+        for spec in expressions:
+            for name in sorted(Expression(spec, engine).names & driven_names(engine)):
+                raise SettingError(
+                    f"the measure '{spec}' looks at '{name}', which the controller has a part in; of runs with a "
+                    "controller a sweep keeps states alone"
+                )
         stops = [
             Watch(stop.words, coordinate=stop.coordinate, level=stop.level, stops=-1 if stop.is_below else 1)
             for stop in plan.stops
@@ -202,6 +210,7 @@ class Runner:
             event_states=any(made.event_states for made in look.measures),
             most_tries=MOST_TRIES,
             threads=1,
+            held=[variant.held for variant in variants if variant.held is not None],
         )
         why: Endings = []
         for number, (ending, state) in enumerate(zip(runs.endings.tolist(), runs.states, strict=True)):
@@ -251,6 +260,7 @@ class Runner:
                     accuracy=plan.accuracy,
                     integrator=plan.integrator,
                     report_interval=plan.interval or plan.to,
+                    controller=plan.controller,
                     initial={infos[k].path: row[k] for k in may} | auxiliary,
                     initial_speeds={infos[k].path: row[count + k] for k in may},
                 )

@@ -12,12 +12,13 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.records import dataclass
+from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Component
 from osimlite.schema.controllers import Controller
 from osimlite.schema.forces import Force
@@ -26,10 +27,13 @@ from osimlite.schema.model import Model
 from osimlite.simulation.many import Renewal
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
-from osimlite.sweep.controls import Control, VariedControls
+from osimlite.sweep.controls import Control, VariedControls, controller_of
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.registry import start_named
 from osimlite.sweep.variables import Floats, Parameter, Property, Slope, Start
+
+if TYPE_CHECKING:
+    from osimlite.simulation.held import Held
 
 RENEWED = Force, Controller, Body, Model
 """What an engine need not be made anew for."""
@@ -47,6 +51,7 @@ class Variant:
     numbers: Floats  # all numbers of an engine that computes batches, empty for others
     maker: Callable[[], Any]  # makes its engine
     simulation: Simulation | None = None  # that the engine is part of; None if only forces are new
+    held: Held | None = None  # of its controller
 
     @cached_property
     def engine(self) -> Any:
@@ -240,6 +245,9 @@ class Variants:
         controls = {place: target for place, target in targets if isinstance(target, Control)}
         self._controls = VariedControls(model, controls, self._plan.interpolation)
         owners += self._controls.controllers
+        if self._plan.controller is not None:
+            # To which what it says is added, behind all else.
+            model.add(controller_of(model, {item.path: 0.0 for item in model.components(Actuator)}))
         can_renew = self._plan.engine == "compiled" and not self._parameters
         self._owners = owners if can_renew and all(isinstance(item, RENEWED) for item in owners) else None
 
@@ -256,7 +264,11 @@ class Variants:
         infos = engine.mechanism.coordinates
         kind = (*(info.path for info in infos), *engine.order, *engine.contacts)
         structure = repr(kind).encode() + getattr(engine, "structure", np.zeros(0)).tobytes()
-        return Variant(simulation.state, structure, getattr(engine, "numbers", np.zeros(0)), lambda: engine, simulation)
+        numbers = getattr(engine, "numbers", np.zeros(0))
+        return Variant(simulation.state, structure, numbers, lambda: engine, simulation, self._held(engine))
+
+    def _held(self, engine: Any) -> Held | None:
+        return None if self._plan.controller is None else self._plan.controller.held(self.model, engine)
 
     def _make(self, values: Sequence[float]) -> Variant:
         self.put(values)
@@ -270,4 +282,7 @@ class Variants:
             return self._whole()
         # The auxiliary states may start otherwise.
         state = StateLayout(made.mechanism, given.state.order, made.forces.elements)
-        return Variant(state, given.structure, made.numbers, made.engine)
+        variant = Variant(state, given.structure, made.numbers, made.engine)
+        if self._plan.controller is not None:
+            variant.held = self._held(variant.engine)
+        return variant

@@ -258,3 +258,49 @@ def test_noisy_walks_alone_are_those_among_many(tmp_path) -> None:
     assert together.results.tolist() == [walked.results[0] for walked in alone]
     calm = Scenario(write_scenario(tmp_path / "calm"))
     assert calm.walk(best, duration=1.0).results[0] != together.results[0]
+
+
+# ------------------------------------------------------------------------------------------------------------- sweeps
+def test_many_runs_are_single_ones_bit_for_bit(model) -> None:
+    """Also where each has muscles of its own, by which forces are measured; in any block and on any thread."""
+    from osimlite.sweep.plan import plan
+    from osimlite.sweep.runner import Runner
+
+    feedback = osimlite.Feedback({"ReflexController": REFLEXES})
+    names = ["flexor/max_isometric_force", "extensor/optimal_fiber_length@scale", "elbow"]
+    made = plan(
+        model, dict.fromkeys(names[:1], "400:900") | {names[1]: "0.9:1.1", names[2]: "0.3:1.5"}, to=0.3,
+        measures=("elbow/value", "max(elbow/speed)"), controller=feedback, controls={"motor": 0.1},
+    )  # fmt: skip
+    rows = np.array([[500.0, 1.0, 0.8], [850.0, 1.05, 0.4], [410.0, 0.93, 1.3]])
+    together = Runner(made).run(rows)
+    assert together.status == ["done"] * 3
+    again = Runner(made).run(rows[[2, 0, 1]])
+    for name in together.measures:
+        assert np.array_equal(together.measures[name][[2, 0, 1]], again.measures[name])
+    for k, (strength, scale, start) in enumerate(rows.tolist()):
+        own = model.copy_deep()
+        own.tree().by_path["/forceset/flexor"].max_isometric_force = strength
+        own.tree().by_path["/forceset/extensor"].optimal_fiber_length *= scale
+        given = {"controls": {"motor": 0.1}, "initial": {"elbow": start}, "engine": "compiled"}
+        alone = simulate(own, 0.3, controller=feedback, **given)
+        assert together.measures["elbow/value"][k] == alone.values[-1, -1]
+    with pytest.raises(OsimliteError, match="looks at 'motor', which the controller has a part in"):
+        Runner(plan(model, {"elbow": "0.3:1.5"}, measures=("max(motor)",), controller=feedback))
+
+
+def test_sweeps_go_by_a_file(model, tmp_path) -> None:
+    pytest.importorskip("yaml", reason="needs PyYAML (extra 'yaml')")
+    pytest.importorskip("pyarrow", reason="needs pyarrow (extra 'sweep')")
+    from tests.cli.command import run as command
+
+    osimlite.write(model, tmp_path / "arm.osim")
+    (tmp_path / "hold.yaml").write_text(
+        'ReflexController:\n  dual_sided: 0\n  DofReflex: {target: motor, source: elbow, P0: 1.2, KP: "~1<0,9>"}\n'
+    )
+    words = ["sweep", tmp_path / "arm.osim", "--vary", "elbow=0.4:1.4:3", "--to", "0.1", "--measure", "elbow/value"]
+    words += ["--controller", tmp_path / "hold.yaml", "-o", tmp_path / "r.parquet"]
+    assert command(*words).code == 0
+    (tmp_path / "stiff.par").write_text("motor-elbow.KP 5 5 1\n")
+    result = command(*words, "--par", tmp_path / "stiff.par")
+    assert result.code != 0 and "settings" in result.err

@@ -40,7 +40,15 @@ def run_many(
             f"the numbers are one row of {len(engine.numbers)} for each of the {count} runs; got {vectors.shape}"
         )
     kinds, levels = _watches(engine, options.watches)
-    batch = Batch(engine, starts, options, vectors=vectors, kinds=kinds, levels=levels)
+    held = None
+    if options.held:
+        if len(options.held) != count:
+            raise OsimliteError(f"{len(options.held)} controllers are given for {count} runs")
+        first, *others = options.held
+        held = first.runs(engine, engine.forces.controls, others=others)
+        # Each run holds controls of its own among its numbers.
+        vectors = vectors if len(vectors) == count else np.tile(vectors, (count, 1))
+    batch = Batch(engine, starts, options, vectors=vectors, kinds=kinds, levels=levels, held=held)
 
     def work(first: int) -> None:
         batch.run(batch.room(), first, min(first + AT_ONCE, count))
