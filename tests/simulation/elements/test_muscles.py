@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from inspect import signature
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -66,6 +67,8 @@ def test_derivatives_forces_and_energy(case, code):
     rows, digits = table(name, case)[:: 1 if code is None else 8], DIGITS.get(name, 2e-12)
     ready = system(hung(muscle(case), [float(row["excitation"]) for row in rows]), code)
     (element,) = ready.forces.elements
+    m: Any = element.values[1] if name == "Millard2012EquilibriumMuscle" else None
+    is_searched = m is not None and m.damping > 0.0 and not m.is_rigid
     for number, row in enumerate(rows):
         y = [float(row[name]) for name in ("path_length", "path_speed", *states(ready))]
         if row["error"]:
@@ -81,10 +84,17 @@ def test_derivatives_forces_and_energy(case, code):
             expected = float(row[name])
             # What is a difference of forces has the digits of these.
             scale = 1e-3 * digits * known["max_isometric_force"] if "Force" in name or name == "Actuation" else 0.0
+            if is_searched:
+                # OpenSim's search for the velocity leaves 1e-10 of the strength.
+                scale += 2e-10 * (known["max_isometric_force"] if scale else 100.0)
             # Exponentials of large numbers have fewer.
             close = digits if abs(expected) < 1e6 else 1e-10
             assert value == pytest.approx(expected, rel=close, abs=1e-14 + scale, nan_ok=True), (number, name)
         assert force == pytest.approx(-known["tension"], rel=1e-15)
+        if is_searched and known["fiber_velocity"] != 0.0:
+            # Here it leaves rounding.
+            borne = (known["active_fiber_force"] + known["passive_fiber_force"]) * known["cos_pennation"]
+            assert borne == pytest.approx(known["tension"], abs=1e-13 * known["max_isometric_force"])
         assert ready.force_records(float(number), y) == [known["tension"]]
         parts = [row[f"{part}PotentialEnergy"] for part in ("Fiber", "Tendon")]
         stored = 0.0 if "n/a" in parts else sum(map(float, parts))
