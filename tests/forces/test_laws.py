@@ -10,10 +10,9 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import get_type_hints
 
-import pytest
-
 from osimlite import forces, kernels
 from osimlite.simulation.elements.kind import Kind, kinds
+from tests.cases import of_each
 
 BUILT_IN = {"abs", "bool", "float", "int", "max", "min", "range"}
 SCALARS = {"bool", "float", "int"}
@@ -51,14 +50,14 @@ def laws():
     return sorted(filter(is_of_forces, result), key=lambda law: (law.__module__, law.__name__))
 
 
-LAWS = [pytest.param(law, id=f"{law.__module__.rpartition('.')[2]}.{law.__name__}") for law in laws()]
+LAWS = laws()
 
 
 def test_all_laws_are_here():
     assert len(LAWS) >= 40
 
 
-@pytest.mark.parametrize("law", LAWS)
+@of_each(LAWS, lambda law: f"{law.__module__}.{law.__name__}")
 def test_stands_alone(law):
     """A function that closes over nothing, and that calls none but laws and those of `math`, can be compiled."""
     for name, value in globals_of(law).items():
@@ -66,7 +65,7 @@ def test_stands_alone(law):
     assert not law.__code__.co_freevars and not law.__code__.co_cellvars
 
 
-@pytest.mark.parametrize("law", LAWS)
+@of_each(LAWS, lambda law: f"{law.__module__}.{law.__name__}")
 def test_takes_and_gives_scalars(law):
     """And triples, tables of numbers, and named tuples of scalars or of tables."""
     named = {name: value for name, value in law.__globals__.items() if inspect.isclass(value) and is_of_forces(value)}

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import pytest
-
 from osimlite.lint.consequences import consequence
 from osimlite.schema.facts import NAN, REFUSED, Facts
 from osimlite.schema.fields import Value
 from osimlite.schema.registry import MODULES, class_for
 from osimlite.schema.specs import field_specs
+from tests.cases import of_each
 
 
 def entries():
@@ -25,8 +24,9 @@ def known_class(name):
     return getattr(import_module(MODULES[name]), name)
 
 
-@pytest.mark.parametrize(("cls", "name"), [*entries()])
-def test_an_entry_is_a_property_with_a_domain(cls, name):
+@of_each([*entries()])
+def test_an_entry_is_a_property_with_a_domain(entry):
+    cls, name = entry
     spec = next(spec for spec in field_specs(known_class(cls)).values() if spec.name == name)
     assert isinstance(spec.kind, Value) and (spec.kind.domain or name in known_class(cls).facts.domains)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+from functools import cache
 from pathlib import Path
 from shutil import copy
 from typing import Any
@@ -16,6 +17,7 @@ from osimlite.lint.baseline import without_baseline, write_baseline
 from osimlite.lint.engine import APART, FAMILIES, Rule, all_rules, groups
 from osimlite.lint.pages import index, page_of
 from osimlite.schema.model import CURRENT_VERSION
+from tests.cases import of_each
 
 HERE = Path(__file__).resolve().parent
 FIXTURES = HERE.parents[1] / "fixtures" / "lint"
@@ -39,6 +41,7 @@ MEASURED = "OSIM63"
 RULES = [pytest.param(rule, id=rule.code) for rule in all_rules()]
 
 
+@cache
 def checked(path: Path, rule: Rule):
     """What is found in an example or fixture of a rule."""
     if path.suffix == ".trial":
@@ -63,13 +66,13 @@ def test_the_skeleton_is_without_findings(path):
     assert str(validate(path)) == "nothing found"
 
 
-@pytest.mark.parametrize("rule", RULES)
+@of_each(all_rules(), lambda rule: rule.code)
 def test_a_module_that_only_some_subjects_load_is_about_these(rule):
     module = rule.check.__module__.rpartition(".")[2]
     assert {kind for kind, names in APART.items() if module.startswith(names)} == {rule.about} & {*APART}
 
 
-@pytest.mark.parametrize("rule", RULES)
+@of_each(all_rules(), lambda rule: rule.code)
 def test_a_page_has_its_headings_and_prose(rule):
     assert re.findall(r"^## (.*)$", rule.page, re.MULTILINE) == HEADINGS
     assert rule.page.splitlines()[0].endswith(".")

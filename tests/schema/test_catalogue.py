@@ -15,6 +15,7 @@ from osimlite.schema.base import Object
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.registry import MODULES, class_for, tags
 from osimlite.schema.specs import field_specs
+from tests.cases import of_each
 
 SCHEMAS = Path(__file__).resolve().parents[2] / "schemas"
 CATALOGUE = json.loads((SCHEMAS / "opensim-4.6.json").read_text())["classes"]
@@ -136,7 +137,7 @@ def same_default_object(made: Object, wanted: dict, where: str) -> None:
     assert overrides.keys() - {"Ground"} <= field_specs(type(made)).keys()
 
 
-@pytest.mark.parametrize("name", CONCRETE)
+@of_each(CONCRETE)
 def test_class_equals_the_catalogue(name: str) -> None:
     entry = CATALOGUE[name]
     cls = declared(entry["xml_tag"])
@@ -192,7 +193,7 @@ def test_class_equals_the_catalogue(name: str) -> None:
         assert (value is None) == (prop["default"] is None), prop["name"]
 
 
-@pytest.mark.parametrize("name", CONCRETE)
+@of_each(CONCRETE)
 def test_every_property_is_declared_where_opensim_declares_it(name: str) -> None:
     entry = CATALOGUE[name]
     cls = declared(entry["xml_tag"])
@@ -201,7 +202,7 @@ def test_every_property_is_declared_where_opensim_declares_it(name: str) -> None
             assert field_specs(cls)[tag_of(prop)].declared_in.tag == prop["declared_in"], prop["name"]
 
 
-@pytest.mark.parametrize("name", CONCRETE)
+@of_each(CONCRETE)
 def test_bases_are_opensims(name: str) -> None:
     cls = declared(CATALOGUE[name]["xml_tag"])
     ours = {base.__name__ for base in cls.__mro__}
@@ -218,7 +219,7 @@ def test_joints_have_opensims_coordinates(name: str) -> None:
     assert len(cls().coordinates) == (CATALOGUE[name]["coordinate_count"] or 0)
 
 
-@pytest.mark.parametrize("name", CONCRETE)
+@of_each(CONCRETE)
 def test_internal_parts_are_opensims(name: str) -> None:
     cls = declared(CATALOGUE[name]["xml_tag"])
     wanted = [(part["name"], part["class"]) for part in CATALOGUE[name].get("internal_subcomponents", [])]

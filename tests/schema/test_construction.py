@@ -17,10 +17,11 @@ from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.model import Model
 from osimlite.schema.registry import MODULES
 from osimlite.schema.specs import defaults, field_specs
+from tests.cases import of_each
 
 CLASSES = {name: getattr(import_module(module), name) for name, module in MODULES.items()}
 
-every_class = pytest.mark.parametrize("cls", CLASSES.values(), ids=CLASSES)
+every_class = of_each(CLASSES.values(), lambda cls: cls.__name__)
 
 
 def filled(cls: type[Object]) -> Object:

@@ -16,6 +16,7 @@ from osimlite.schema.descriptions import meaning_of
 from osimlite.schema.json_schema import json_schema
 from osimlite.schema.registry import MODULES
 from osimlite.schema.specs import FieldSpec
+from tests.cases import of_each
 
 LONGEST = 140
 
@@ -32,7 +33,7 @@ def test_there_are_properties() -> None:
     assert len(SPECS) > 600
 
 
-@pytest.mark.parametrize("key", SPECS)
+@of_each(SPECS)
 def test_every_property_has_a_meaning(key: str) -> None:
     meaning = meaning_of(SPECS[key])
     assert len(meaning.split()) >= 2, f"write a line below the declaration of {key}"
@@ -41,7 +42,7 @@ def test_every_property_has_a_meaning(key: str) -> None:
     assert meaning == " ".join(meaning.split()), "one line"
 
 
-@pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.tag)
+@of_each(CLASSES, lambda cls: cls.tag)
 def test_what_is_written_in_ticks_exists(cls: type[Object]) -> None:
     """Names of other properties in a text are those of the same object, of a part of it, or of what owns it."""
     known = {name for each in CLASSES for spec in each.field_specs().values() for name in (spec.tag, spec.name)}
