@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -19,11 +21,10 @@ SHOWN = {
 }
 """What the outputs of each must have among them."""
 
+# They are loaded by the tests: every process of pytest collects all of these.
 for package in ("ipykernel", "nbclient", "numba", "matplotlib", "xarray", "cma", "mujoco", "mkdocs"):
-    pytest.importorskip(package, reason=f"needs {package} (extra 'dev')")
-import nbformat  # noqa: E402
-
-from docs import _notebooks as notebooks  # noqa: E402
+    if find_spec(package) is None:
+        pytest.skip(f"needs {package} (extra 'dev')", allow_module_level=True)
 
 
 def test_all_are_listed() -> None:
@@ -33,6 +34,7 @@ def test_all_are_listed() -> None:
 @pytest.mark.parametrize("name", SHOWN)
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::RuntimeWarning")
 def test_it_runs(name: str) -> None:
+    nbformat, notebooks = import_module("nbformat"), import_module("docs._notebooks")
     path = FOLDER / f"{name}.ipynb"
     kept = nbformat.read(path, as_version=4)
     assert not any(cell.get("outputs") or cell.get("execution_count") for cell in kept.cells), "strip its outputs"

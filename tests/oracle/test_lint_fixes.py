@@ -32,9 +32,6 @@ def safely_mended(text: str) -> tuple[str, int]:
     return data.decode(), count
 
 
-MENDED = [fault for fault in faults.FAULTS if safely_mended(fault.change(WALKER.read_text())[0])[1]]
-
-
 def printed(text: str, path: Path) -> str | None:
     """OpenSim's print of a document, None if it refuses it."""
     opensim = pytest.importorskip("opensim")
@@ -48,16 +45,17 @@ def printed(text: str, path: Path) -> str | None:
     return re.sub(r"<!--.*?-->", "", str(model.dump()), flags=re.DOTALL)
 
 
-def test_there_are_faults_with_a_safe_mend():
-    assert len(MENDED) >= 10
-
-
-@pytest.mark.parametrize("fault", MENDED, ids=lambda fault: fault.name)
-def test_after_a_safe_mend_opensim_reads_what_was_meant(fault, tmp_path):
-    original = printed(WALKER.read_text(), tmp_path / "original.osim")
-    broken, _ = fault.change(WALKER.read_text())
+def test_after_a_safe_mend_opensim_reads_what_was_meant(tmp_path):
+    original, mends = printed(WALKER.read_text(), tmp_path / "original.osim"), 0
     assert original is not None
-    assert printed(safely_mended(broken)[0], tmp_path / "mended.osim") == original
+    for fault in faults.FAULTS:
+        text, count = safely_mended(fault.change(WALKER.read_text())[0])
+        if count:
+            mends += 1
+            assert printed(text, tmp_path / "mended.osim") == original, fault.name
+            # Nothing of the file is left in the process.
+            assert printed(text, tmp_path / "mended.osim") == original, fault.name
+    assert mends >= 10
 
 
 DAMAGE = (
