@@ -1,0 +1,55 @@
+"""Commands in processes that are made in a moment: copies of this one, which has imported what commands import.
+
+    python served.py INPUT OUTPUT ERRORS    the numbers of the files that commands read and write
+
+A line of JSON asks for a command: its words, its folder, its environment. The answer is its exit code.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import sys
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+
+import osimlite.cli
+
+
+def load() -> None:
+    """Import the commands, and all that stands within their functions."""
+    for name in osimlite.cli.COMMANDS:
+        source = Path(osimlite.cli.__file__).with_name(f"{name.replace('-', '_')}.py").read_text(encoding="utf-8")
+        osimlite.cli._loaded(name)
+        for line in ast.walk(ast.parse(source)):
+            # What is not installed is missed by the command that needs it.
+            with suppress(ImportError):
+                for module in [line.module] if isinstance(line, ast.ImportFrom) else []:
+                    import_module(module or "")
+
+
+def become_one() -> None:
+    """Wait for orders; this comes back in a process that is to be a command."""
+    for line in sys.stdin:
+        order = json.loads(line)
+        child = os.fork()
+        if not child:
+            for number, own in enumerate(map(int, sys.argv[1:])):
+                os.dup2(own, number)
+            sys.stdin = os.fdopen(0, encoding="utf-8", closefd=False)
+            os.environ.clear()
+            os.environ.update(order["environment"])
+            os.chdir(order["folder"])
+            sys.path[0] = order["folder"]
+            sys.argv = ["osimlite", *order["words"]]
+            return
+        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+    raise SystemExit
+
+
+if __name__ == "__main__":
+    load()
+    become_one()
+    osimlite.cli.main()
