@@ -69,7 +69,10 @@ class Scan:
                 self._take(lines, [whole] * len(lines), line, zeros)
             else:
                 forms = looks.split(b"\n")
-                kinds = [form and (form == whole or self._is_good(form)) for form in forms]
+                # Where markers were not seen, a good row has another form than a whole one.
+                kinds = [
+                    form and (form == whole or (self.markers and _seen(form, self.cells) is not None)) for form in forms
+                ]
                 for kind, group in groupby(range(len(lines)), kinds.__getitem__):
                     places = list(group)
                     if kind:
@@ -84,10 +87,6 @@ class Scan:
         if not self.rows.count:
             self.rows.unseen.clear()
         return self.rows
-
-    def _is_good(self, form: bytes) -> bool:
-        """Whether a form other than that of a whole row is one of a good row."""
-        return self.markers and _seen(form, self.cells) is not None
 
     def _take(self, lines: list[bytes], forms: list[bytes], line: int, zeros: bool) -> None:
         """Note times and samples of good rows."""

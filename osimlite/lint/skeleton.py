@@ -91,7 +91,12 @@ def growth(subject: Subject) -> Growth:
     ground, masses = subject.path(bones.ground), {subject.path(body): body.mass for body in bones.bodies}
     edges = [
         # OpenSim asks an empty joint of the class how many coordinates it has.
-        _Edge(subject.path(parent), subject.path(child), () if _has_none(link.joint) else (0,), link)
+        _Edge(
+            subject.path(parent),
+            subject.path(child),
+            () if isinstance(link.joint, WeldJoint | CustomJoint) else (0,),
+            link,
+        )
         for link, parent, child in bones.pairs()
     ]
     joined = {path for edge in edges for path in edge[:2]}
@@ -124,10 +129,6 @@ def _fails(subject: Subject, edges: list[_Edge], order: dict[str, _Edge]) -> boo
                 return True
             late.remove(outer)
     return False
-
-
-def _has_none(joint: Joint) -> bool:
-    return isinstance(joint, WeldJoint | CustomJoint)
 
 
 @once

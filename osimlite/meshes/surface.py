@@ -92,7 +92,8 @@ def _halves(points: Array, quads: Indices) -> Indices:
 
 def _ears(corners: Array) -> Indices:
     """Triangles (k - 2, 3) of a polygon of k corners (k, 3): corners are cut off that hold no other corner."""
-    normal = _cross_sum(corners)
+    # Twice the area vector (Newell).
+    normal: Array = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
     left = list(range(len(corners)))
     triangles: list[tuple[int, int, int]] = []
     while len(left) > 3:
@@ -102,12 +103,6 @@ def _ears(corners: Array) -> Indices:
         triangles.append(ear)
         left.remove(ear[1])
     return np.array([*triangles, left], dtype=np.int64)
-
-
-def _cross_sum(corners: Array) -> Array:
-    """Twice the area vector of a polygon (Newell)."""
-    total: Array = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
-    return total
 
 
 def _is_ear(corners: Array, ear: tuple[int, int, int], left: Iterable[int], normal: Array) -> bool:

@@ -67,40 +67,30 @@ def muscles(model: Model) -> list[Muscle]:
     return [force for force in model.force_set.objects if isinstance(force, Muscle)]
 
 
-@operation(p.ModOpIgnoreActivationDynamics)
-def _ignore_activation(model: Model, operator: Any, folder: Path) -> None:
-    for muscle in model.components(Muscle):
-        muscle.ignore_activation_dynamics = True
+SETTINGS: dict[type, tuple[type[Muscle], str, Callable[[Any, Any], object]]] = {
+    p.ModOpIgnoreActivationDynamics: (Muscle, "ignore_activation_dynamics", lambda operator, old: True),
+    p.ModOpIgnoreTendonCompliance: (Muscle, "ignore_tendon_compliance", lambda operator, old: True),
+    p.ModOpScaleMaxIsometricForce: (Muscle, "max_isometric_force", lambda operator, old: old * operator.scale_factor),
+    p.ModOpIgnorePassiveFiberForcesDGF: (
+        DeGrooteFregly2016Muscle, "ignore_passive_fiber_force", lambda operator, old: True,
+    ),
+    p.ModOpScaleActiveFiberForceCurveWidthDGF: (
+        DeGrooteFregly2016Muscle, "active_force_width_scale", lambda operator, old: operator.scale_factor,
+    ),
+    p.ModOpTendonComplianceDynamicsModeDGF: (
+        DeGrooteFregly2016Muscle, "tendon_compliance_dynamics_mode", lambda operator, old: operator.mode,
+    ),
+}  # fmt: skip
+"""By operator, the muscles that it sets a property of, which, and to what: as the operator says, from what it was."""
 
 
-@operation(p.ModOpIgnoreTendonCompliance)
-def _stiff_tendons(model: Model, operator: Any, folder: Path) -> None:
-    for muscle in model.components(Muscle):
-        muscle.ignore_tendon_compliance = True
+def _set(model: Model, operator: Any, folder: Path) -> None:
+    kind, name, value = SETTINGS[type(operator)]
+    for muscle in model.components(kind):
+        setattr(muscle, name, value(operator, getattr(muscle, name)))
 
 
-@operation(p.ModOpScaleMaxIsometricForce)
-def _strength(model: Model, operator: p.ModOpScaleMaxIsometricForce, folder: Path) -> None:
-    for muscle in model.components(Muscle):
-        muscle.max_isometric_force *= operator.scale_factor
-
-
-@operation(p.ModOpIgnorePassiveFiberForcesDGF)
-def _no_passive(model: Model, operator: Any, folder: Path) -> None:
-    for muscle in model.components(DeGrooteFregly2016Muscle):
-        muscle.ignore_passive_fiber_force = True
-
-
-@operation(p.ModOpScaleActiveFiberForceCurveWidthDGF)
-def _width(model: Model, operator: p.ModOpScaleActiveFiberForceCurveWidthDGF, folder: Path) -> None:
-    for muscle in model.components(DeGrooteFregly2016Muscle):
-        muscle.active_force_width_scale = operator.scale_factor
-
-
-@operation(p.ModOpTendonComplianceDynamicsModeDGF)
-def _tendon_mode(model: Model, operator: p.ModOpTendonComplianceDynamicsModeDGF, folder: Path) -> None:
-    for muscle in model.components(DeGrooteFregly2016Muscle):
-        muscle.tendon_compliance_dynamics_mode = operator.mode
+OPERATIONS.update(dict.fromkeys(SETTINGS, _set))
 
 
 @operation(p.ModOpRemoveMuscles)

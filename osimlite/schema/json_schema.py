@@ -38,7 +38,8 @@ def json_schema(tag: str = "Model") -> dict[str, Any]:
         definitions[cls.tag] = _definition(cls, classes)
     for cls in {spec.accepts for each in classes for spec in field_specs(each).values() if spec.accepts is not None}:
         if cls.abstract:
-            definitions[cls.tag] = {"description": _summary(cls), **_any_of(cls, classes)}
+            held = [*(_said(other) for other in classes if issubclass(other, cls)), {"$ref": "#/$defs/Unknown"}]
+            definitions[cls.tag] = {"description": _summary(cls), "anyOf": held}
     return {
         "$schema": DIALECT,
         "title": f"A {tag} of OpenSim 4.6 as plain data",
@@ -116,10 +117,6 @@ def _one(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any]:
         return exact
     kinds = [_said(other) for other in classes if issubclass(other, cls) and other is not cls]
     return {"anyOf": [exact, *kinds]} if kinds else exact
-
-
-def _any_of(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any]:
-    return {"anyOf": [*(_said(other) for other in classes if issubclass(other, cls)), {"$ref": "#/$defs/Unknown"}]}
 
 
 def _said(cls: type[Object]) -> dict[str, Any]:

@@ -85,7 +85,8 @@ def sobol_cma(ask: Ask, search: Search) -> str:
 def differential_evolution(ask: Ask, search: Search) -> str:
     """Differential evolution (scipy's); why it ended."""
     optimize = require("scipy.optimize", extra="sweep", purpose="the search by differential evolution")
-    _needs_bounds(search)
+    if not search.is_bounded:
+        raise SettingError("differential evolution stays within the ranges; take --method cma to leave them")
     rng, size = np.random.default_rng(search.seed), len(search.start)
     first = rng.random((max(5, search.popsize or 10 * size), size))
     first[0] = search.start
@@ -147,8 +148,3 @@ def method_named(name: str) -> Callable[[Ask, Search], str]:
 def _needs_two(search: Search) -> None:
     if len(search.start) < 2:
         raise SettingError("cma searches two variables or more; take --method nelder-mead for one")
-
-
-def _needs_bounds(search: Search) -> None:
-    if not search.is_bounded:
-        raise SettingError("differential evolution stays within the ranges; take --method cma to leave them")

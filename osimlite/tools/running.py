@@ -140,9 +140,5 @@ def _reports(file: str, away: dict[str, None], passed: frozenset[str] = frozense
                 continue
             if path == naming.name.strip() and not os.path.isabs(path):
                 away[path] = None
-            if path not in passed and _is_checked(path):
+            if path not in passed and (is_table(path) or path.lower().endswith(".xml")):
                 yield from _reports(path, away, passed | {file})
-
-
-def _is_checked(path: str) -> bool:
-    return is_table(path) or path.lower().endswith(".xml")

@@ -159,24 +159,11 @@ class _Collector:
         look, scale = shape.appearance, np.array(shape.scale_factors, dtype=float)
         visible = look.visible and look.surface_properties.representation != 0
         body, placed = self.mechanism.frames[frame]
-        match shape:
-            case geometry.Brick():
-                own, size = unit_shapes.cube(), _stretched(2.0 * np.array(shape.half_lengths))
-            case geometry.Sphere():
-                own, size = unit_shapes.ball(), _stretched((shape.radius,) * 3)
-            case geometry.Ellipsoid():
-                own, size = unit_shapes.ball(), _stretched(shape.radii)
-            case geometry.Cylinder():
-                length = 2.0 * shape.half_height
-                own, size = unit_shapes.tube(), _TO_Z @ _stretched((shape.radius, shape.radius, length))
-            case geometry.Mesh():
-                own, size = self._mesh(shape.mesh_file), np.eye(4)
-            case geometry.LineGeometry():
-                ends = np.array((shape.start_point, shape.end_point), dtype=float) * scale
-                self._line(path, "geometry", body, placed, ends, look.color, visible)
-                return
-            case _:
-                raise UnsupportedError(f"is a {type(shape).__name__}, which osimlite does not draw")
+        if isinstance(shape, geometry.LineGeometry):
+            ends = np.array((shape.start_point, shape.end_point), dtype=float) * scale
+            self._line(path, "geometry", body, placed, ends, look.color, visible)
+            return
+        own, size = self._shape(shape)
         self._add(path, "geometry", body, own, placed @ _stretched(scale) @ size, look.color, look.opacity, visible)
 
     def _contact(self, surface: contact.ContactGeometry, path: str) -> None:
@@ -185,23 +172,10 @@ class _Collector:
         look = surface.appearance
         opacity = CONTACT_OPACITY * look.opacity
         visible = look.visible and look.surface_properties.representation != 0
-        match surface:
-            case contact.ContactSphere():
-                own, size = unit_shapes.ball(), _stretched((surface.radius,) * 3)
-            case contact.ContactEllipsoid():
-                own, size = unit_shapes.ball(), _stretched(surface.radii)
-            case contact.ContactCylinder():
-                own, size = unit_shapes.tube(), _stretched((surface.radius, surface.radius, _ENDLESS))
-            case contact.ContactTorus() if surface.torus_radius > 0.0:
-                own = unit_shapes.ring(surface.tube_radius / surface.torus_radius)
-                size = _stretched((surface.torus_radius,) * 3)
-            case contact.ContactMesh():
-                own, size = self._mesh(surface.filename), np.eye(4)
-            case contact.ContactHalfSpace():
-                self.half_spaces.append(len(self.items))
-                own, size, opacity = unit_shapes.sheet(), np.eye(4), HALF_SPACE_OPACITY * look.opacity
-            case _:
-                raise UnsupportedError(f"is a {type(surface).__name__}, which osimlite does not draw")
+        if isinstance(surface, contact.ContactHalfSpace):
+            self.half_spaces.append(len(self.items))
+            opacity = HALF_SPACE_OPACITY * look.opacity
+        own, size = self._shape(surface)
         self._add(path, "contact", body, own, here @ size, look.color, opacity, visible)
 
     def _wrap(self, surface: wrapping.WrapObject, path: str) -> None:
@@ -212,22 +186,37 @@ class _Collector:
             raise UnsupportedError("is in no frame")
         body, placed = self.mechanism.frames[self.tree.path_of(frame) or ""]
         here = placed @ offset(surface.translation, surface.xyz_body_rotation)
-        match surface:
-            case wrapping.WrapSphere():
-                own, size = unit_shapes.ball(), _stretched((surface.radius,) * 3)
-            case wrapping.WrapEllipsoid():
-                own, size = unit_shapes.ball(), _stretched(surface.dimensions)
-            case wrapping.WrapCylinder():
-                own, size = unit_shapes.tube(), _stretched((surface.radius, surface.radius, surface.length))
-            case wrapping.WrapTorus() if surface.outer_radius > 0.0:
-                # In spite of their names: the radius of the tube, and that of the circle in its middle.
-                own = unit_shapes.ring(surface.inner_radius / surface.outer_radius)
-                size = _stretched((surface.outer_radius,) * 3)
-            case _:
-                raise UnsupportedError(f"is a {type(surface).__name__}, which osimlite does not draw")
+        own, size = self._shape(surface)
         look = surface.appearance
         visible = look.visible and look.surface_properties.representation != 0 and surface.active
         self._add(path, "wrap", body, own, here @ size, look.color, WRAP_OPACITY * look.opacity, visible)
+
+    def _shape(self, shape: Component) -> tuple[Surface, Array]:
+        """A unit shape, and what makes the shape of it (4, 4)."""
+        match shape:
+            case geometry.Brick():
+                return unit_shapes.cube(), _stretched(2.0 * np.array(shape.half_lengths))
+            case geometry.Sphere() | contact.ContactSphere() | wrapping.WrapSphere():
+                return unit_shapes.ball(), _stretched((shape.radius,) * 3)
+            case geometry.Ellipsoid() | contact.ContactEllipsoid():
+                return unit_shapes.ball(), _stretched(shape.radii)
+            case wrapping.WrapEllipsoid():
+                return unit_shapes.ball(), _stretched(shape.dimensions)
+            case geometry.Cylinder():
+                return unit_shapes.tube(), _TO_Z @ _stretched((shape.radius, shape.radius, 2.0 * shape.half_height))
+            case contact.ContactCylinder() | wrapping.WrapCylinder():
+                length = getattr(shape, "length", _ENDLESS)
+                return unit_shapes.tube(), _stretched((shape.radius, shape.radius, length))
+            case contact.ContactTorus() if shape.torus_radius > 0.0:
+                return unit_shapes.ring(shape.tube_radius / shape.torus_radius), _stretched((shape.torus_radius,) * 3)
+            case wrapping.WrapTorus() if shape.outer_radius > 0.0:
+                # In spite of their names: the radius of the tube, and that of the circle in its middle.
+                return unit_shapes.ring(shape.inner_radius / shape.outer_radius), _stretched((shape.outer_radius,) * 3)
+            case geometry.Mesh() | contact.ContactMesh():
+                return self._mesh(shape.mesh_file if isinstance(shape, geometry.Mesh) else shape.filename), np.eye(4)
+            case contact.ContactHalfSpace():
+                return unit_shapes.sheet(), np.eye(4)
+        raise UnsupportedError(f"is a {type(shape).__name__}, which osimlite does not draw")
 
     def _path(self, path: AbstractGeometryPath, name: str) -> None:
         owner = self.tree.parent_of(path)

@@ -124,8 +124,9 @@ def _contact_lists(subject: Subject) -> Iterator[tuple[Component, list[Object], 
         if id(use.owner) in forces and use.reference.rule == "contactgeometry-path-or-name":
             forces[id(use.owner)][2].append(use)
     for owner, holders, uses in forces.values():
-        yield owner, [holder for holder in holders if _lists_contacts(holder)], uses
-
-
-def _lists_contacts(holder: Object) -> bool:
-    return any(s.reference.target == "ContactGeometry" for s in reference_specs(type(holder)))
+        lists = [
+            holder
+            for holder in holders
+            if any(spec.reference.target == "ContactGeometry" for spec in reference_specs(type(holder)))
+        ]
+        yield owner, lists, uses

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, cast
 
-from osimlite.forces.vectors import Vector, cross, norm
+from osimlite.forces.vectors import cross, norm
 from osimlite.lint.axes import axes_of, axes_refused, coordinates_of, names_on
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
@@ -120,7 +120,9 @@ def collinear_axes(subject: Subject, found: FindingSink) -> None:
             # Of an axis with NaN in it OpenSim's comparison says nothing.
             kind = [axis for axis in kind if not any(map(math.isnan, axis.axis))]
             for index, axis in enumerate(kind):
-                twin = next((other for other in kind[:index] if _parallel(axis.axis, other.axis)), None)
+                twin = next(
+                    (other for other in kind[:index] if not norm(cross(axis.axis, other.axis)) >= _COLLINEAR), None
+                )
                 # An axis without a length is parallel to every other one; the finding belongs to it.
                 short = math.hypot(*axis.axis) < _COLLINEAR
                 if short or (twin is not None and math.hypot(*twin.axis) >= _COLLINEAR):
@@ -174,10 +176,6 @@ def idle_coordinate(subject: Subject, found: FindingSink) -> None:
 
 _COLLINEAR = 1e-5
 """Length of the cross product of two axes below which OpenSim 4.6 refuses them; it does not make them unit vectors."""
-
-
-def _parallel(one: Vector, other: Vector) -> bool:
-    return not norm(cross(one, other)) >= _COLLINEAR
 
 
 def _motion_by(joint: CustomJoint, coordinate: Coordinate) -> list[float]:

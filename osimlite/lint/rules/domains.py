@@ -45,7 +45,8 @@ def not_finite(subject: Subject, found: FindingSink) -> None:
             if math.isnan(number) or (math.isinf(number) and not _bound(item, spec))
         ]
         if bad:
-            fate = "OpenSim refuses the model" if _refuses_not_finite(item, spec, bad[0]) else _NAN_FATE
+            refused = spec.tag == "gravity" or (spec.tag == "mass" and math.isnan(bad[0]))
+            fate = "OpenSim refuses the model" if refused else _NAN_FATE
             if spec.tag in ("min_control", "max_control"):
                 fate = "what takes it as a bound fails"
             found(
@@ -192,7 +193,8 @@ def _find_outside(subject: Subject) -> Iterator[_Outside]:
                 if id(item) in obstacles and (spec.name, wrong[0]) != ("torus_radius", 0):
                     fate, fails = REFUSED, True
                 else:
-                    fate, fails = consequence(cls, spec.name, wrong[0], rigid_tendon=_is_rigid(item))
+                    rigid = bool(getattr(item, "ignore_tendon_compliance", False))
+                    fate, fails = consequence(cls, spec.name, wrong[0], rigid_tendon=rigid)
                 domain = _domain(cls, spec)
                 yield item, spec, value, Verdict(wrong[0], domain, fate, fails)
 
@@ -239,10 +241,6 @@ def _domains(cls: type[Object]) -> tuple[tuple[FieldSpec, Callable[[float], bool
     return tuple(result)
 
 
-def _is_rigid(item: Object) -> bool:
-    return bool(getattr(item, "ignore_tendon_compliance", False))
-
-
 def _reals(subject: Subject) -> Iterator[tuple[Object, FieldSpec, Any]]:
     """Every property that may hold a number that is huge or not finite: a quick test, since there are many numbers."""
     for cls, items in subject.by_class.items():
@@ -281,10 +279,6 @@ def _bound(item: Object, spec: FieldSpec) -> bool:
     if any(isinstance(number, float) and math.isinf(number) for number in _numbers(spec.default)):
         return True
     return re.search(r"range|limit|(?:^|_)(?:min|max)(?:_|$)|bound", spec.tag) is not None
-
-
-def _refuses_not_finite(item: Object, spec: FieldSpec, number: float) -> bool:
-    return spec.tag == "gravity" or (spec.tag == "mass" and number != number)
 
 
 def _word_of(subject: Subject, item: Object, spec: FieldSpec, number: float) -> str | None:

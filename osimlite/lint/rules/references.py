@@ -336,10 +336,6 @@ def _undecided(subject: Subject, use: Use, text: str) -> bool:
     return False
 
 
-def _has_ignored_parts(subject: Subject, owner: Component) -> bool:
-    return any(note.owner is owner and note.kind in ("unknown-tag", "unknown-class") for note in subject.notes)
-
-
 def _names(subject: Subject, use: Use) -> str:
     """``HuntCrossleyForce 'foot': geometry names``."""
     return f"{_holder(subject, use)}: {use.spec.tag} names"
@@ -372,7 +368,7 @@ def _report(subject: Subject, found: FindingSink, broken: Broken, message: str) 
     certain = broken.hint == "comma" or (broken.why in ("case", "form") and not broken.hint)
     # A frame deep in another component only happens to have the name.
     certain = certain and (broken.suggestion or "").count("/") < 3
-    if _has_ignored_parts(subject, use.owner):
+    if any(note.owner is use.owner and note.kind in ("unknown-tag", "unknown-class") for note in subject.notes):
         # What OpenSim ignores here may hold what is meant.
         place = None
     found(

@@ -89,7 +89,8 @@ def closed_loop(subject: Subject, found: FindingSink) -> None:
     pairs = Counter(map(_ends, bones.links))
     for link in growth(subject).loops:
         if pairs[_ends(link)] == 1 and link.child_base is not None:
-            before = next((other.joint for other in bones.links if _carries(other, link)), None)
+            others = (other.joint for other in bones.links if other is not link and other.child_base is link.child_base)
+            before = next(others, None)
             other = f", which {called(before)} has placed already" if before is not None else ""
             found(
                 f"{called(link.joint)} closes a loop at {called(link.child_base)}{other}; {_fate_of_loop(bones, link)}",
@@ -165,10 +166,6 @@ def massless_leaf(subject: Subject, found: FindingSink) -> None:
 
 def _ends(link: Link) -> frozenset[int]:
     return frozenset((id(link.parent_base), id(link.child_base)))
-
-
-def _carries(link: Link, other: Link) -> bool:
-    return link is not other and link.child_base is other.child_base
 
 
 def _fate_of_loop(bones: Skeleton, link: Link) -> str:
