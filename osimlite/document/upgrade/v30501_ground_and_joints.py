@@ -1,8 +1,8 @@
-"""To 30501: ground is no body, joints are no part of bodies, and markers name their frame by its path."""
+"""To 30501: ground is no body, and joints are no part of bodies."""
 
 from __future__ import annotations
 
-from osimlite.document.upgrade.draft import Draft, Element, body_path, elements, members, plain, step
+from osimlite.document.upgrade.draft import Draft, Element, elements, members, plain, step
 
 _KEPT_BY_GROUND = {"VisibleObject", "WrapObjectSet", "attached_geometry", "components", "geometry"}
 
@@ -57,14 +57,3 @@ def _settle(draft: Draft, joint: Element, body: Element, objects: Element) -> No
         draft.add(joint, "socket_child_frame", body.get("name", ""), source=body)
     draft.move(joint, objects)
     draft.changed(joint)
-
-
-@step(below=30501)
-def marker_frames(draft: Draft) -> None:
-    """A marker names its body by path."""
-    for marker in draft.tagged("Marker"):
-        body = marker.find("body")
-        if body is not None:
-            body.text = body_path(plain(body))
-            draft.rename(body, "socket_parent_frame")
-            draft.changed(marker)

@@ -1,4 +1,4 @@
-"""To 30505 and 30506: a component names another by its path."""
+"""To 30500, 30501, 30505 and 30506: a component names another by its path."""
 
 from __future__ import annotations
 
@@ -27,28 +27,22 @@ def constraint_bodies(draft: Draft) -> None:
             draft.changed(constraint)
 
 
-@step(below=30505)
-def point_bodies(draft: Draft) -> None:
-    """Path points name their body by path."""
-    for point in draft.every("AbstractPathPoint"):
-        if _to_body(draft, point, "body", "socket_parent_frame"):
-            draft.changed(point)
+def _naming(name: str, below: int, whose: str, family: str, tag: str, socket: str) -> None:
+    """Register the step `name`: the body that a tag of a class names is named by its path, in a socket."""
+
+    def named(draft: Draft) -> None:
+        for component in draft.every(family):
+            if _to_body(draft, component, tag, socket):
+                draft.changed(component)
+
+    named.__name__, named.__doc__ = name, f"{whose} body by path."
+    step(below=below)(named)
 
 
-@step(below=30505)
-def contact_bodies(draft: Draft) -> None:
-    """Contact geometry names its body by path."""
-    for geometry in draft.every("ContactGeometry"):
-        if _to_body(draft, geometry, "body_name", "socket_frame"):
-            draft.changed(geometry)
-
-
-@step(below=30506)
-def force_frames(draft: Draft) -> None:
-    """A prescribed force names its body by path."""
-    for force in draft.tagged("PrescribedForce"):
-        if _to_body(draft, force, "body", "socket_frame"):
-            draft.changed(force)
+_naming("marker_frames", 30501, "A marker names its", "Marker", "body", "socket_parent_frame")
+_naming("point_bodies", 30505, "Path points name their", "AbstractPathPoint", "body", "socket_parent_frame")
+_naming("contact_bodies", 30505, "Contact geometry names its", "ContactGeometry", "body_name", "socket_frame")
+_naming("force_frames", 30506, "A prescribed force names its", "PrescribedForce", "body", "socket_frame")
 
 
 @step(below=30505)
