@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,6 +19,13 @@ STUDIES = "sliding-100", "pendulum-50", "squat-25"
 SCHEMES = "trapezoidal", "legendre-gauss-3", "legendre-gauss-radau-3"
 
 
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    """What is found of a study as it is, by its name."""
+    folder = tmp_path_factory.mktemp("solved")
+    return cache(lambda name: solve(study_file(folder, name)))
+
+
 @pytest.mark.parametrize("name", STUDIES)
 def test_moco_s_solution_is_one_here(name, tmp_path):
     program = Program(problem_of(study_file(tmp_path, name)))
@@ -29,9 +37,8 @@ def test_moco_s_solution_is_one_here(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", STUDIES)
-def test_ours_costs_no_more(name, tmp_path):
-    said = moco_said(name)
-    found = solve(study_file(tmp_path, name))
+def test_ours_costs_no_more(name, solved):
+    said, found = moco_said(name), solved(name)
     assert found.success
     assert found.objective <= said["objective"] * (1.0 + 1e-4)
     assert found.objective == pytest.approx(sum(found.terms.values()))
@@ -67,17 +74,16 @@ def test_schemes_agree(scheme, tmp_path):
     assert found.objective == pytest.approx(0.4, abs=2e-3)
 
 
-def test_implicit_dynamics_agree(tmp_path):
-    explicit, implicit = (
-        solve(study(tmp_path, "pendulum-50", multibody_dynamics_mode=mode)) for mode in ("explicit", "implicit")
-    )
+def test_implicit_dynamics_agree(tmp_path, solved):
+    explicit = solved("pendulum-50")
+    implicit = solve(study(tmp_path, "pendulum-50", multibody_dynamics_mode="implicit"))
     assert implicit.success
     assert implicit.objective == pytest.approx(explicit.objective, rel=1e-4)
     assert implicit.trajectory.names["derivatives"] == ("/jointset/j0/q0/accel", "/jointset/j1/q1/accel")
 
 
-def test_the_file_comes_back_and_starts_another_search(tmp_path):
-    found = solve(study_file(tmp_path, "pendulum-50"))
+def test_the_file_comes_back_and_starts_another_search(tmp_path, solved):
+    found = solved("pendulum-50")
     found.write(tmp_path / "solution.sto")
     again = MocoTrajectory.read(tmp_path / "solution.sto")
     assert again.header["status"] == "Solve_Succeeded"
