@@ -41,20 +41,20 @@ def renamed(source: Source | None, number: int, tag: str | None, *, safe: bool =
     return Fix(tuple(edits), safe)
 
 
-def without_element(source: Source | None, number: int, *, safe: bool = True) -> Fix | None:
+def without_element(source: Source | None, number: int) -> Fix | None:
     """Take an element out, and its line with it if nothing else stands there."""
     if source is None:
         return None
     span = source.spans[number]
-    return Fix((_whole_line(source.text, span.start, span.end),), safe)
+    return Fix((_whole_line(source.text, span.start, span.end),), True)
 
 
-def without_attribute(source: Source | None, number: int, name: str, *, safe: bool = True) -> Fix | None:
+def without_attribute(source: Source | None, number: int, name: str) -> Fix | None:
     """Take an attribute out."""
     if source is None:
         return None
     result = source.attributes_of(number).get(name)
-    return Fix((Edit(result.before, result.end, ""),), safe) if result else None
+    return Fix((Edit(result.before, result.end, ""),), True) if result else None
 
 
 def without_text(source: Source, start: int, end: int) -> Fix:

@@ -49,18 +49,17 @@ class Fitted(NamedTuple):
     worst_arm: float
 
 
-def fit_paths(model: Model, tolerance: float = TOLERANCE, poses: int = POSES, seed: int = 0) -> list[Fitted]:
+def fit_paths(model: Model, tolerance: float = TOLERANCE, poses: int = POSES) -> list[Fitted]:
     """Polynomials for all paths of forces of a model; see the module.
 
     Args:
         model: whose paths; those that are functions already are left as they are.
         tolerance: root mean squares that are good enough, m.
         poses: how many are tried, over the ranges of the coordinates.
-        seed: of the poses.
     """
     known = paths(model)
     mechanism = known.mechanism
-    q, free = _poses(mechanism, poses, seed)
+    q, free = _poses(mechanism, poses)
     still = np.zeros(len(mechanism.coordinates))
     lengths = np.array([known.system.measured(row, still, LENGTH) for row in q])
     arms = known.all_moment_arms(q)
@@ -72,13 +71,13 @@ def fit_paths(model: Model, tolerance: float = TOLERANCE, poses: int = POSES, se
     return result
 
 
-def _poses(mechanism: Mechanism, count: int, seed: int) -> tuple[Array, list[int]]:
+def _poses(mechanism: Mechanism, count: int) -> tuple[Array, list[int]]:
     """Poses (k, n) where the constraints hold, and the coordinates that are varied."""
     infos = mechanism.coordinates
     dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
     free = [k for k, info in enumerate(infos) if k not in dependent and not info.locked and info.prescribed is None]
     bounds = np.array([_range(infos[k].range) for k in free]).reshape(-1, 2)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     # One in each of as many equal parts of every range.
     parts = np.array([rng.permutation(count) for _ in free]).T.reshape(count, len(free)) + rng.random(
         (count, len(free))

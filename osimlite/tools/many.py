@@ -306,19 +306,14 @@ class _Work:
                         self.note(trial)
             except WorkerLostError:
                 alone = under_way
-            for setup in alone:
-                self._alone(do, setup)
-            alone = []
-
-    def _alone(self, do: Callable[[Path], Trial], setup: Path) -> None:
-        from osimlite.sweep.pools import WorkerLostError, processes
-
-        try:
-            with processes(do, workers=1) as pool:
-                pool.submit(setup, setup)
-                self.note(pool.result()[1])
-        except WorkerLostError:
-            self.note(Trial(str(setup), FAILED, message="the process that ran it has ended, twice"))
+            while alone:
+                setup = alone.pop(0)
+                try:
+                    with processes(do, workers=1) as pool:
+                        pool.submit(setup, setup)
+                        self.note(pool.result()[1])
+                except WorkerLostError:
+                    self.note(Trial(str(setup), FAILED, message="the process that ran it has ended, twice"))
 
 
 def _needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
