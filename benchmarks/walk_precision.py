@@ -24,13 +24,13 @@ from osimlite.simulation.copies import Copies
 METHODS = {
     "euler2": (1e-2, 3e-3, 1e-3, 1e-4, 1e-5),
     "merson": (1e-1, 1e-2, 1e-3, 1e-4, 1e-6),
-    "rosenbrock": (1e-1, 1e-2, 1e-3, 1e-4),
+    "rosenbrock": (1e-1, 1e-2, 6e-3, 3e-3, 1e-3, 1e-4),
     "adams": (1e-2, 1e-3, 1e-4, 1e-6),
     "bdf": (1e-2, 1e-3, 1e-4),
 }
 USUAL = "euler2", 1e-3
 """What SCONE takes."""
-EVERY, TIMES = 4, 3
+EVERY, TIMES = 4, 9
 
 
 def measured(scenario: Scenario, seconds: float, steps: int) -> list[tuple[str, float, float, float, float]]:

@@ -4,14 +4,15 @@ An implicit method solves (1 - c J) d = r over and over, J being the derivative 
 Here J is what muscles, springs and stops make of it: each pushes along one displacement, with a force and with rates of
 its states that depend on that displacement, its speed and these states only. So its states are eliminated by
 themselves, as internal variables of a material are in finite elements, and so are the coordinates, whose rates count
-as the speeds. What is left is symmetric and of the size of the speeds: the mass matrix, and of each force a stiffness
-along its generalized force of 1 N. The equations of constraints count as heavy masses along them. Contacts of
-half spaces and spheres are three such forces, along the normal and across it. All else (gravity, Coriolis forces, that
-friction grows with the normal force) is left out of J: iterations converge without it, and W-methods keep their order.
+as the speeds. What is left is of the size of the speeds: the mass matrix, and of each force a stiffness along its
+generalized force of 1 N. The equations of constraints count as heavy masses along them. Contacts of half spaces and
+spheres are three such forces, along the normal and across it; friction grows with the depth. All else (gravity,
+Coriolis forces, how levers change) is left out of J: iterations converge without it, and W-methods keep their order.
 """
 
 from __future__ import annotations
 
+from osimlite.forces.vectors import ZERO, Vector, cross, dot, minus, plus, put, times, turned, vector
 from osimlite.kernels.constrained_dynamics import bind
 from osimlite.kernels.dynamics import (
     SMALLEST_PIVOT,
@@ -20,9 +21,27 @@ from osimlite.kernels.dynamics import (
     generalized_forces,
     spatial_inertias_and_bias,
 )
-from osimlite.kernels.layout import CONSTRAINED, DOF, MODEL, OUTCOME, RESPONSE_INTS, STAGE, WORK
-from osimlite.kernels.least_squares import cholesky, substitute
+from osimlite.kernels.layout import (
+    CONSTRAINED,
+    CONTACT_WORK,
+    DOF,
+    GRAVITY_AT,
+    INERTIA_AT,
+    ITEM,
+    LINK,
+    LINK_WORK,
+    MODEL,
+    MOTION,
+    OPERATION,
+    OPERATION_WORK,
+    OUTCOME,
+    RESPONSE_INTS,
+    STAGE,
+    WORK,
+)
+from osimlite.kernels.parts import link_ints, link_work, operation_ints, operation_work, screw
 from osimlite.kernels.pointers import Floats, Ints, at, call
+from osimlite.kernels.points import station
 
 MOST_STATES = 3
 """A force has at most so many states that are condensed."""
@@ -30,17 +49,23 @@ WIDTH = 2 + MOST_STATES
 """Length of a row of derivatives: by displacement, speed and states. The rows are of the force and of the rates."""
 INVERSE = (1 + MOST_STATES) * WIDTH
 GAINS = INVERSE + MOST_STATES * MOST_STATES
-PULLS, RIGHT, LEVER = GAINS + MOST_STATES, GAINS + 2 * MOST_STATES, GAINS + 3 * MOST_STATES
-FIRST, END = LEVER + 1, LEVER + 2
-RESPONSE_WORK = LEVER + 3
+PULLS, RIGHT = GAINS + MOST_STATES, GAINS + 2 * MOST_STATES
+FIRST, END, RESPONSE_WORK = GAINS + 3 * MOST_STATES, GAINS + 3 * MOST_STATES + 1, GAINS + 3 * MOST_STATES + 2
 """What is known of a force besides the generalized force of 1 N: the derivatives; the inverse of 1 - c J of the states;
-what a speed does to them, and they to the force; their right sides; what the displacement does to the force; the first
-degree of freedom that it moves, and the one after the last."""
+what a speed does to them, and they to the force; their right sides; the first degree of freedom that it moves, and the
+one after the last."""
+SYSTEM, STIFFNESS, DAMPING, LEVERS, RIGHT_AT = range(1, 6)
+"""Matrices (n, n) in the room, behind that of the masses: that to be solved; how generalized forces change with
+coordinates and with speeds while states stay; how with coordinates while states follow. A right side is behind them."""
 
+LOAD = 12
+"""How many numbers the loads of a link are."""
+CENTER = 7
+"""Place of the centre of surface 2 among the numbers of a contact."""
 SLIGHT = 1e-12
 """What counts as rounding among generalized forces of 1 N."""
 
-KERNEL, ITEM, FIRST_STATE, STATES, SENSE = 0, 1, 2, 3, 4
+KERNEL, OF_ITEM, FIRST_STATE, STATES, SENSE = 0, 1, 2, 3, 4
 """Integers of a response: its kernel, its item, its first state and their count, and the sense in which it pulls."""
 
 HEAVY = 1e6
@@ -49,7 +74,7 @@ HEAVY = 1e6
 
 def condensation_room(size: int, responses: int) -> int:
     """How many numbers the equations of so many speeds and forces need."""
-    return 2 * size * size + size + responses * (size + RESPONSE_WORK)
+    return RIGHT_AT * size * size + size + responses * (size + RESPONSE_WORK)
 
 
 def linearise(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, room: Floats, is_evaluated: float) -> int:
@@ -68,12 +93,16 @@ def linearise(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, room: Floats,
     spatial_inertias_and_bias(s, x, w)
     composite_rigid_body(s, w, right)
     masses(s, w, room)
+    stiffness, damping = at(room, STIFFNESS * size * size), at(room, DAMPING * size * size)
+    for k in range(size * size):
+        stiffness[k] = damping[k] = 0.0
+    turn_levers(s, x, w, stiffness)
     for number in range(s[MODEL.RESPONSES]):
         response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
         clear_wrenches(s, w)
         for k in range(size):
-            right[k] = 0.0
-        status = call(response[KERNEL], s, x, w, y, f, response[ITEM])
+            f[k] = right[k] = 0.0
+        status = call(response[KERNEL], s, x, w, y, f, response[OF_ITEM])
         if status != OUTCOME.OK:
             return status
         changes = response[STATES] > 0
@@ -88,13 +117,18 @@ def linearise(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, room: Floats,
             if abs(right[k]) > SLIGHT:
                 first, end = min(first, k), k + 1
         known[size + FIRST], known[size + END] = first, end
+        if changes:
+            sense, by_displacement, by_speed = response[SENSE], known[size], known[size + 1]
+            add_product(size, 1.0, known, first, end, f, 0, size, stiffness)
+            add_product(size, sense * by_displacement, known, first, end, known, first, end, stiffness)
+            add_product(size, sense * by_speed, known, first, end, known, first, end, damping)
     return OUTCOME.OK
 
 
 def known_of(s: Ints, room: Floats, number: int) -> Floats:
     """The part of the room of a force: its generalized force of 1 N, and what RESPONSE_WORK tells."""
     size = s[MODEL.DOFS]
-    return at(room, 2 * size * size + size + number * (size + RESPONSE_WORK))
+    return at(room, RIGHT_AT * size * size + size + number * (size + RESPONSE_WORK))
 
 
 def masses(s: Ints, w: Floats, mass: Floats) -> None:
@@ -116,27 +150,91 @@ def masses(s: Ints, w: Floats, mass: Floats) -> None:
             for k in range(size):
                 square += row[k] * row[k]
             if square > 0.0:
-                add_square(size, HEAVY * largest / square, row, 0, size, mass)
+                add_product(size, HEAVY * largest / square, row, 0, size, row, 0, size, mass)
 
 
-def add_square(size: int, factor: float, row: Floats, first: int, end: int, matrix: Floats) -> None:
-    """Add a multiple of the product of a row with itself, from an entry up to another."""
+def turn_levers(s: Ints, x: Floats, w: Floats, levers: Floats) -> None:
+    """Add how generalized forces of weights and of contacts change as coordinates move their points, to (n, n).
+
+    They are what is left of the inertias, which have served: of each link the force on it and on all that it carries,
+    and the sum of products of places (from the origin of the spatial vectors) with forces, by rows.
+    """
+    size = s[MODEL.DOFS]
+    for link in range(s[MODEL.LINKS]):
+        b, load = at(x, INERTIA_AT + 10 * link), at(link_work(s, w, link), LINK_WORK.INERTIA)
+        for k in range(LOAD):
+            load[k] = 0.0
+        add_load(s, w, link, station(s, w, link, vector(b, 1)), times(b[0], vector(x, GRAVITY_AT)), ZERO)
+    for pair in range(s[MODEL.CONTACTS]):
+        i = at(s, s[s[MODEL.CONTACT_AT] + pair])
+        contact = at(w, s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
+        force, point = vector(contact, CONTACT_WORK.FORCE), vector(contact, CONTACT_WORK.FORCE + 3)
+        one, two = i[ITEM.OWN], i[ITEM.OWN + 1]
+        if contact[CONTACT_WORK.DEPTH] > 0.0 and max(one, two) >= 0:
+            center = station(s, w, two, vector(x, i[ITEM.NUMBERS] + CENTER))
+            add_load(s, w, two, point, force, minus(center, point))
+            add_load(s, w, one, point, times(-1.0, force), ZERO)
+    for link in range(s[MODEL.LINKS] - 1, -1, -1):
+        i, here = link_ints(s, link), link_work(s, w, link)
+        load, origin = at(here, LINK_WORK.INERTIA), vector(here, LINK_WORK.ORIGIN)
+        for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
+            j = operation_ints(s, operation)
+            if j[OPERATION.DOF] < 0 or j[OPERATION.MOTION] >= MOTION.BALL:
+                continue
+            turn, shift = screw(j, operation_work(s, w, operation), origin)
+            moved = minus(cross(shift, vector(load, 0)), times(load[3] + load[7] + load[11], turn))
+            moved, inner, within = plus(moved, turned(at(load, 3), turn)), operation, link
+            while within >= 0:
+                other = operation_ints(s, inner)
+                if other[OPERATION.DOF] >= 0 and other[OPERATION.MOTION] == MOTION.TURN:
+                    change = dot(moved, vector(operation_work(s, w, inner), OPERATION_WORK.AXIS))
+                    levers[size * j[OPERATION.DOF] + other[OPERATION.DOF]] += change
+                    if inner != operation:
+                        levers[size * other[OPERATION.DOF] + j[OPERATION.DOF]] += change
+                inner -= 1
+                while within >= 0 and inner < link_ints(s, within)[LINK.FIRST_OPERATION]:
+                    within = link_ints(s, within)[LINK.PARENT]
+                    inner = link_ints(s, within)[LINK.END_OPERATION] - 1 if within >= 0 else -1
+        if i[LINK.PARENT] >= 0:
+            below = at(link_work(s, w, i[LINK.PARENT]), LINK_WORK.INERTIA)
+            for n in range(LOAD):
+                below[n] += load[n]
+
+
+def add_load(s: Ints, w: Floats, link: int, point: Vector, force: Vector, off: Vector) -> None:
+    """Add a force on a link at a point, which moves as does that of the link that is so far off."""
+    if link >= 0:
+        here = link_work(s, w, link)
+        load, arm = at(here, LINK_WORK.INERTIA), minus(point, vector(here, LINK_WORK.ORIGIN))
+        put(load, 0, plus(vector(load, 0), force))
+        for k in range(3):
+            put(load, 3 + 3 * k, plus(vector(load, 3 + 3 * k), plus(times(arm[k], force), times(force[k], off))))
+
+
+def add_product(
+    size: int, factor: float, a: Floats, first: int, end: int, b: Floats, start: int, last: int, matrix: Floats
+) -> None:
+    """Add a multiple of the product of two rows, each from an entry up to another."""
     for i in range(first, end):
-        if row[i] != 0.0:
-            scaled, target = factor * row[i], at(matrix, size * i)
-            for k in range(first, end):
-                target[k] += scaled * row[k]
+        if a[i] != 0.0:
+            scaled, target = factor * a[i], at(matrix, size * i)
+            for k in range(start, last):
+                target[k] += scaled * b[k]
 
 
 def condense(s: Ints, c: float, room: Floats) -> bool:
     """Eliminate all but the speeds from 1 - c J; whether that can be solved."""
     size = s[MODEL.DOFS]
-    system = at(room, size * size)
+    system, levers = at(room, SYSTEM * size * size), at(room, LEVERS * size * size)
+    stiffness, damping = at(room, STIFFNESS * size * size), at(room, DAMPING * size * size)
     for k in range(size * size):
-        system[k] = room[k]
+        system[k] = room[k] - c * (damping[k] + c * stiffness[k])
+        levers[k] = stiffness[k]
     for number in range(s[MODEL.RESPONSES]):
         response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
-        count, places, a = response[STATES], at(s, response[ITEM] + response[FIRST_STATE]), at(known, size)
+        count, places, a = response[STATES], at(s, response[OF_ITEM] + response[FIRST_STATE]), at(known, size)
+        if count == 0:
+            continue
         inverse, gains, pulls, driven = at(a, INVERSE), at(a, GAINS), at(a, PULLS), at(a, RIGHT)
         for i in range(count):
             rates = at(a, WIDTH * (1 + i))
@@ -146,7 +244,7 @@ def condense(s: Ints, c: float, room: Floats) -> bool:
                 own = c * rates[2 + k] if there and places[k] >= 0 else 0.0
                 inverse[count * i + k] = (1.0 if i == k else 0.0) - own
         invert(count, inverse)
-        stiffness, lever = c * a[0] + a[1], a[0]
+        by_speed = by_displacement = 0.0
         for i in range(count):
             gains[i] = pulls[i] = 0.0
             for k in range(count):
@@ -155,11 +253,38 @@ def condense(s: Ints, c: float, room: Floats) -> bool:
                     pulls[i] += inverse[count * k + i] * a[2 + k]
         for i in range(count):
             if places[i] >= 0:
-                stiffness += a[2 + i] * gains[i]
-                lever += c * pulls[i] * a[WIDTH * (1 + i)]
-        a[LEVER] = lever
-        add_square(size, -c * response[SENSE] * stiffness, known, int(a[FIRST]), int(a[END]), system)
-    return cholesky(size, system, SMALLEST_PIVOT)
+                by_speed += a[2 + i] * gains[i]
+                by_displacement += c * pulls[i] * a[WIDTH * (1 + i)]
+        first, end, sense = int(a[FIRST]), int(a[END]), response[SENSE]
+        add_product(size, -c * sense * by_speed, known, first, end, known, first, end, system)
+        add_product(size, sense * by_displacement, known, first, end, known, first, end, levers)
+    return eliminate(size, system, room)
+
+
+def eliminate(size: int, a: Floats, masses: Floats) -> bool:
+    """Factorise a matrix (size, size) in its place; whether each pivot is more than a part of the mass there."""
+    for k in range(size):
+        row = at(a, size * k)
+        if not row[k] > SMALLEST_PIVOT * masses[size * k + k]:
+            return False
+        row[k] = 1.0 / row[k]
+        for i in range(k + 1, size):
+            other = at(a, size * i)
+            if other[k] != 0.0:
+                factor = other[k] * row[k]
+                other[k] = factor
+                for j in range(k + 1, size):
+                    other[j] -= factor * row[j]
+    return True
+
+
+def substitute(size: int, a: Floats, x: Floats) -> None:
+    """Solve with the factors of `eliminate` in place."""
+    for i in range(size):
+        x[i] -= product(0, i, at(a, size * i), x)
+    for i in range(size - 1, -1, -1):
+        row = at(a, size * i)
+        x[i] = (x[i] - product(i + 1, size, row, x)) * row[i]
 
 
 def invert(size: int, a: Floats) -> None:
@@ -180,25 +305,27 @@ def invert(size: int, a: Floats) -> None:
 def correct(s: Ints, c: float, room: Floats, d: Floats) -> None:
     """Solve (1 - c J) d = r in place, after `condense` with the same c."""
     size = s[MODEL.DOFS]
-    du, system, right = at(d, size), at(room, size * size), at(room, 2 * size * size)
+    du, system, right = at(d, size), at(room, SYSTEM * size * size), at(room, RIGHT_AT * size * size)
+    levers = at(room, LEVERS * size * size)
     for i in range(size):
         right[i] = 0.0
         for k in range(size):
-            right[i] += room[size * i + k] * du[k]
+            right[i] += room[size * i + k] * du[k] + c * levers[size * i + k] * d[k]
     for number in range(s[MODEL.RESPONSES]):
         response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
-        places, a = at(s, response[ITEM] + response[FIRST_STATE]), at(known, size)
-        first, end = int(a[FIRST]), int(a[END])
-        force = a[LEVER] * response[SENSE] * product(first, end, known, d)
+        places, a, force = at(s, response[OF_ITEM] + response[FIRST_STATE]), at(known, size), 0.0
         for k in range(response[STATES]):
             if places[k] >= 0:
-                force += a[PULLS + k] * d[places[k]]
-        for k in range(first, end):
-            right[k] += c * force * known[k]
+                force += c * a[PULLS + k] * d[places[k]]
+        if force != 0.0:
+            for k in range(int(a[FIRST]), int(a[END])):
+                right[k] += force * known[k]
     substitute(size, system, right)
     for number in range(s[MODEL.RESPONSES]):
         response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
-        count, places, a = response[STATES], at(s, response[ITEM] + response[FIRST_STATE]), at(known, size)
+        count, places, a = response[STATES], at(s, response[OF_ITEM] + response[FIRST_STATE]), at(known, size)
+        if count == 0:
+            continue
         first, end = int(a[FIRST]), int(a[END])
         displacement = response[SENSE] * product(first, end, known, d)
         speed = response[SENSE] * product(first, end, known, right)

@@ -9,9 +9,10 @@ from __future__ import annotations
 from math import sqrt
 
 from osimlite.forces.hunt_crossley import contact_derivatives, contact_force, half_space_sphere, sphere_sphere
-from osimlite.forces.vectors import Vector, cross, minus, over, put, times, vector
-from osimlite.kernels.condensation import INVERSE
-from osimlite.kernels.layout import ITEM, OUTCOME, WORK
+from osimlite.forces.vectors import ZERO, Vector, along, cross, dot, minus, over, plus, put, times, vector
+from osimlite.kernels.condensation import CENTER, INVERSE
+from osimlite.kernels.layout import ITEM, LINK, LINK_WORK, MODEL, MOTION, OPERATION, OPERATION_WORK, OUTCOME, WORK
+from osimlite.kernels.parts import link_ints, link_work, operation_ints, operation_work, screw
 from osimlite.kernels.pointers import Floats, Ints, at
 from osimlite.kernels.points import apply_force, direction, station, velocity
 
@@ -56,8 +57,7 @@ def contact_response(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: 
     """Apply 1 N along the normal of a contact or across it, and leave in SCRATCH how its force there changes.
 
     The integers of the item are how far before it that of the contact is, 0 along the normal, 1 and 2 across it, and
-    whether surface 1 is a half space. That friction depends on the normal force is left out: it makes the equations of
-    :mod:`osimlite.kernels.condensation` lose their symmetry.
+    whether surface 1 is a half space. Friction grows with the force along the normal, and that as the depth to 1.5.
     """
     i, change = at(s, item), at(w, WORK.SCRATCH)
     pair, axis = item - i[ITEM.OWN], i[ITEM.OWN + 1]
@@ -68,21 +68,66 @@ def contact_response(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: 
         one, two, p = s[pair + ITEM.OWN], s[pair + ITEM.OWN + 1], at(x, s[pair + ITEM.NUMBERS])
         v = minus(velocity(s, w, one, point), velocity(s, w, two, point))
         pressed, damped, dragged = contact_derivatives(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
-        way = n
+        way, by_depth = n, 0.0
         if axis > 0:
             # Any two directions across the normal do.
             nx, ny, nz = n
             way = over(cross(n, (1.0, 0.0, 0.0)), sqrt(ny * ny + nz * nz))
             if abs(nx) > 0.7:
                 way = over(cross(n, (0.0, 1.0, 0.0)), sqrt(nx * nx + nz * nz))
-            change[1] = -dragged
+            if axis > 1:
+                way = cross(n, way)
+            change[1], by_depth = -dragged, -1.5 / d * dragged * dot(v, way)
         else:
             change[0], change[1] = -pressed, -damped
-        if axis > 1:
-            way = cross(n, way)
         apply_force(s, w, two, point, way)
         apply_force(s, w, one, point, times(-1.0, way))
+        center = station(s, w, two, vector(p, CENTER))
+        sinks = times(1.0 - p[12], n)
+        turns(s, w, y, f, two, point, center, n, sinks, times(by_depth, n), times(change[1], way))
+        turns(s, w, y, f, one, point, point, n, sinks, times(-by_depth, n), times(-change[1], way))
     return OUTCOME.OK
+
+
+def turns(
+    s: Ints,
+    w: Floats,
+    y: Floats,
+    row: Floats,
+    link: int,
+    point: Vector,
+    center: Vector,
+    n: Vector,
+    sinks: Vector,
+    by_place: Vector,
+    by_motion: Vector,
+) -> None:
+    """Add to a row how coordinates change products with the place of a point of a link and with its velocity there.
+
+    The point moves as another of the link, a center, but for a part of what that moves along n.
+    """
+    if link < 0:
+        return
+    here = link_work(s, w, link)
+    origin, spin = vector(here, LINK_WORK.ORIGIN), vector(here, LINK_WORK.VELOCITY)
+    arm, turning, shifting = minus(point, origin), ZERO, ZERO
+    while link >= 0:
+        i = link_ints(s, link)
+        for operation in range(i[LINK.END_OPERATION] - 1, i[LINK.FIRST_OPERATION] - 1, -1):
+            j, a = operation_ints(s, operation), operation_work(s, w, operation)
+            if j[OPERATION.MOTION] >= MOTION.BALL:
+                continue
+            turn, shift = screw(j, a, origin)
+            rate = a[OPERATION_WORK.RATE]
+            if j[OPERATION.DOF] >= 0:
+                moved = plus(shift, cross(turn, minus(center, origin)))
+                moved = minus(moved, times(dot(n, moved), sinks))
+                swept = plus(plus(cross(turn, shifting), cross(shift, turning)), cross(cross(turn, turning), arm))
+                placed = dot(by_place, plus(shift, cross(turn, arm)))
+                row[j[OPERATION.DOF]] += placed + dot(by_motion, plus(swept, cross(spin, moved)))
+                rate = y[s[MODEL.DOFS] + j[OPERATION.DOF]]
+            turning, shifting = along(turning, rate, turn), along(shifting, rate, shift)
+        link = i[LINK.PARENT]
 
 
 def press(s: Ints, x: Floats, w: Floats, item: int, d: float, radius: float, n: Vector, point: Vector) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.forces.vectors import ZERO, Vector, along, cross, minus, plus, put, times, vector
+from osimlite.forces.vectors import ZERO, Vector, along, cross, plus, put, times, vector
 from osimlite.kernels.layout import (
     FIXED_NUMBERS,
     GRAVITY_AT,
@@ -17,7 +17,7 @@ from osimlite.kernels.layout import (
     TRANSFORM,
     WORK,
 )
-from osimlite.kernels.parts import link_ints, link_work, operation_ints, operation_work
+from osimlite.kernels.parts import link_ints, link_work, operation_ints, operation_work, screw
 from osimlite.kernels.pointers import Floats, Ints, at, call
 from osimlite.kernels.trigonometry import sine_cosine
 
@@ -121,9 +121,7 @@ def move(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
             a = operation_work(s, w, operation)
             motion, freedom = j[OPERATION.MOTION], j[OPERATION.DOF]
             if motion < MOTION.BALL:
-                turn, shift = ZERO, vector(a, OPERATION_WORK.AXIS)
-                if motion == MOTION.TURN:
-                    turn, shift = shift, cross(minus(vector(a, OPERATION_WORK.POINT), origin), shift)
+                turn, shift = screw(j, a, origin)
                 if freedom >= 0:
                     rate = y[size + freedom]
                     column = at(w, s[MODEL.WORK_COLUMN] + 6 * freedom)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from osimlite.kernels.layout import LINK, LINK_WORK, MODEL, OPERATION, OPERATION_WORK
+from osimlite.forces.vectors import ZERO, Vector, cross, minus, vector
+from osimlite.kernels.layout import LINK, LINK_WORK, MODEL, MOTION, OPERATION, OPERATION_WORK
 from osimlite.kernels.pointers import Floats, Ints, at
 
 
@@ -24,3 +25,11 @@ def operation_ints(s: Ints, operation: int) -> Ints:
 def operation_work(s: Ints, w: Floats, operation: int) -> Floats:
     """Work of an operation, see `OPERATION_WORK`."""
     return at(w, s[MODEL.WORK_OPERATION] + OPERATION_WORK.SIZE * operation)
+
+
+def screw(j: Ints, a: Floats, origin: Vector) -> tuple[Vector, Vector]:
+    """What a unit of the amount of an operation turns, and shifts at an origin; not of balls."""
+    axis = vector(a, OPERATION_WORK.AXIS)
+    if j[OPERATION.MOTION] == MOTION.TURN:
+        return axis, cross(minus(vector(a, OPERATION_WORK.POINT), origin), axis)
+    return ZERO, axis

@@ -1,8 +1,10 @@
-"""A Rosenbrock method of order 3, for stiff motion at loose tolerances.
+"""A Rosenbrock method of order 3, for stiff motion at loose tolerances: four linear systems a step, and no iteration.
 
-ROS34PW2 (J. Rang, L. Angermann, New Rosenbrock W-methods of order 3 for partial differential algebraic equations of
-index 1, BIT 45, 2005): four linear systems a step instead of an iteration. It is L-stable and stiffly accurate, and
-keeps its order whatever the derivatives J are, so that those of :mod:`osimlite.kernels.condensation` do.
+The first two stages are at the start of the step, so that two evaluations do for a step besides that at its end. The
+method is L-stable and stiffly accurate. The conditions of order 3, and of order 2 whatever the derivatives J are, leave
+a method of this shape one free number, its diagonal (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II,
+chapters IV.6 and IV.7); a quarter is near the least with which it is stable. What J of
+:mod:`osimlite.kernels.condensation` leaves out costs it little.
 """
 
 from __future__ import annotations
@@ -34,21 +36,17 @@ STAGES = 4
 STATES = STAGES
 """The method keeps a derivative for each stage: so many vectors as long as a state."""
 
-DIAGONAL = 4.3586652150845900e-01
-ALPHA = (
-    (0.0, 0.0, 0.0, 0.0),
-    (8.7173304301691801e-01, 0.0, 0.0, 0.0),
-    (8.4457060015369423e-01, -1.1299064236484185e-01, 0.0, 0.0),
-    (0.0, 0.0, 1.0, 0.0),
-)
+DIAGONAL = 0.25
+ALPHA = ((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), (1 / 3, 0.0, 0.0, 0.0), (43 / 56, 31 / 56, -9 / 28, 0.0))
 GAMMA = (
     (DIAGONAL, 0.0, 0.0, 0.0),
-    (-8.7173304301691801e-01, DIAGONAL, 0.0, 0.0),
-    (-9.0338057013044082e-01, 5.4180672388095326e-02, DIAGONAL, 0.0),
-    (2.4212380706095346e-01, -1.2232505839045147, 5.4526025533510214e-01, DIAGONAL),
+    (0.5, DIAGONAL, 0.0, 0.0),
+    (-11 / 72, -7 / 72, DIAGONAL, 0.0),
+    (-43 / 56, -31 / 56, 15 / 14, DIAGONAL),
 )
-WEIGHTS = (2.4212380706095346e-01, -1.2232505839045147, 1.5452602553351020, DIAGONAL)
-EMBEDDED = (3.7810903145819369e-01, -9.6042292212423178e-02, 0.5, 2.1793326075422950e-01)
+WEIGHTS = (0.0, 0.0, 0.75, DIAGONAL)
+EMBEDDED = (43 / 280, 31 / 280, 0.6 - 9 / 140, 0.2)
+"""A fifth of the way to the formula of order 2 where the last stage is evaluated: as large as errors are at the end."""
 
 
 def _by_gamma(row: tuple[float, ...]) -> tuple[float, ...]:
@@ -68,7 +66,7 @@ MISSES = _by_gamma(tuple(one - other for one, other in zip(WEIGHTS, EMBEDDED, st
 TIMES = tuple(sum(row) for row in ALPHA)
 """The coefficients as the stages need them, in which no product with J occurs (E. Hairer, G. Wanner, Solving Ordinary
 Differential Equations II, chapter IV.7): by rows where a stage is evaluated, and what it has of those before it; what
-end and error have of the stages; times."""
+end and error have of the stages; times, of which 0 is the start, where the derivative is known."""
 
 SAFETY, SHRINK, GROW, WORTH = 0.9, 0.2, 5.0, 1.1
 """Of the step that should just do, which is taken; how much a step changes at most, and at least to be made longer."""
@@ -81,7 +79,7 @@ def rosenbrock(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int
     stages, room = at(h, HEAD), at(h, HEAD + STATES * size)
     errors, f1 = at(w, s[MODEL.WORK_STATE] + ERRORS * size), at(y1, size)
     t0, accuracy, step = h[REACHED], h[ACCEPTED], h[NEXT_STEP]
-    h[EVALUATED], h[HAS_DERIVATIVE] = STAGES - 1.0, 0.0
+    h[EVALUATED], h[HAS_DERIVATIVE] = 2.0, 0.0
     t1 = h[LAST_TIME] if h[LAST_TIME] <= t0 + 1.001 * step else t0 + step
     cut = t1 - t0 < 0.95 * step
     step = t1 - t0
@@ -115,8 +113,8 @@ def staged(
     """Compute the stages; y has room for a state and its derivative."""
     size, f = s[MODEL.STATE_SIZE], at(y, s[MODEL.STATE_SIZE])
     for i in range(STAGES):
-        stage, rates = at(stages, size * i), f if i > 0 else at(y0, size)
-        if i > 0:
+        stage, rates = at(stages, size * i), f if TIMES[i] > 0.0 else at(y0, size)
+        if TIMES[i] > 0.0:
             for k in range(size):
                 y[k] = y0[k]
                 for j in range(i):

@@ -20,6 +20,7 @@ from osimlite.kernels.meshes import MESH_WORK, load_mesh
 from osimlite.kernels.pointers import Floats, Ints
 from osimlite.kernels.points import angular_velocity, station, velocity
 from osimlite.multibody.links import Placement, Places
+from osimlite.multibody.mechanism import GROUND
 from osimlite.multibody.spatial import Array, transform
 from osimlite.records import dataclass
 from osimlite.schema.contact import ContactMesh
@@ -74,7 +75,7 @@ class ElasticFoundation(PairContact):
 
     def items(self, places: Places) -> list[Item]:
         """The contacts, and after them what computes each."""
-        contacts = [Item("touch_mesh", is_contact=True, is_part=True) for _ in self.pairs]
+        contacts = [Item("touch_mesh", (GROUND, GROUND), is_contact=True, is_part=True) for _ in self.pairs]
         return contacts + [self._pair(number, pair, places) for number, pair in enumerate(self.pairs)]
 
     def _pair(self, number: int, pair: ContactPair, places: Places) -> Item:
