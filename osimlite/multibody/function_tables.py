@@ -10,12 +10,15 @@ from osimlite.multibody import functions as f
 
 
 def function_table(function: f.Function, where: str) -> list[float]:
-    """The table of a function.
+    """The table of a function of coordinates.
 
     Raises:
         UnsupportedError: there is none.
     """
-    table = [*function.table]
+    return _known(f.table_at_knots(function), function, where)
+
+
+def _known(table: list[float], function: f.Function, where: str) -> list[float]:
     if not table:
         name = type(function).__name__
         raise UnsupportedError(f"{where} is a {name}, which cannot be computed; take another function")
@@ -48,4 +51,4 @@ def _table_of_one(function: f.Function, where: str) -> list[float]:
             coefficients[power] += coefficient
         kind, *rest = f.Polynomial(tuple(reversed(coefficients))).table
         return [PIECES_OF_OPENSIM if function.opensim_derivatives else kind, *rest]
-    return function_table(function, where)
+    return _known([*function.table], function, where)

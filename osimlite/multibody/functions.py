@@ -55,19 +55,16 @@ class Univariate(Function):
 
     def derivatives(self, x: float) -> tuple[float, float, float]:
         """Value, first and second derivative at `x`, all three as plain numbers; NaN where `x` is not finite."""
-        return self._at(x) if math.isfinite(x) else _NOTHING
-
-    def _at(self, x: float) -> tuple[float, float, float]:
         numbers: Any = memoryview(self._numbers)
         try:
-            return value_at(numbers, x)
+            return value_at(numbers, x) if math.isfinite(x) else _NOTHING
         except ValueError:
             # The sine of what is too large for a float.
             return _NOTHING
 
     @cached_property
     def _numbers(self) -> array[float]:
-        return array("d", self.table)
+        return array("d", table_at_knots(self))
 
 
 class Multivariate(Function):
@@ -268,14 +265,9 @@ class PiecewiseLinear(Univariate):
 
     @property
     def table(self) -> Sequence[float]:
-        """The lines; at a knot the kernels take the one after it, which is not always OpenSim's."""
+        """The lines, without the last point."""
         slopes = (np.diff(self.y) / np.diff(self.x)).tolist()
         return _pieces(self.x[:-1], [*zip(self.y[:-1], slopes, strict=True)])
-
-    def _at(self, x: float) -> tuple[float, float, float]:
-        k = _interval(self.x, x)
-        slope = (self.y[k + 1] - self.y[k]) / (self.x[k + 1] - self.x[k])
-        return self.y[k] + slope * (x - self.x[k]), slope, 0.0
 
 
 @dataclass(frozen=True)
@@ -287,11 +279,8 @@ class PiecewiseConstant(Univariate):
 
     @property
     def table(self) -> Sequence[float]:
-        """The steps; at a knot the kernels take the one after it, which is not always OpenSim's."""
+        """The steps."""
         return _pieces(self.x, [(y,) for y in self.y])
-
-    def _at(self, x: float) -> tuple[float, float, float]:
-        return self.y[-1 if x >= self.x[-1] else _interval(self.x, x)], 0.0, 0.0
 
 
 class SimmSpline(Univariate):
@@ -342,16 +331,28 @@ def _pieces(knots: Sequence[float], pieces: Sequence[Sequence[float]]) -> list[f
     return [PIECES, 1.0, float(len(knots)), float(width), *knots, *(x for row in rows for x in row)]
 
 
-def _interval(knots: Sequence[float], x: float) -> int:
-    """The index of the knot before `x`, of the first or last but one for `x` outside.
+def table_at_knots(function: Function) -> list[float]:
+    """The table of a function, by which the kernels take at a knot the piece that OpenSim takes there.
 
-    At a knot both neighbours would do. OpenSim takes the one that this search by halves meets first, which shows
-    where slopes or values jump.
+    They take the one after it; where OpenSim takes that before it, the knot is moved by its last digit. It shows where
+    slopes or values jump.
     """
-    if x <= knots[0]:
-        return 0
-    if x >= knots[-1]:
-        return len(knots) - 2
+    table, inner = [*function.table], function
+    while isinstance(inner, Scaled):
+        inner = inner.function
+    if isinstance(inner, PiecewiseLinear | PiecewiseConstant | SimmSpline):
+        # That of a spline has the first knot twice.
+        first = 5 if isinstance(inner, SimmSpline) else 4
+        for k in range(1, len(inner.x) - 1):
+            if _interval(inner.x, inner.x[k]) < k:
+                table[first + k] = math.nextafter(inner.x[k], math.inf)
+    return table
+
+
+def _interval(knots: Sequence[float], x: float) -> int:
+    """The index of the first point of the piece that OpenSim takes at a knot: a search by halves meets it first."""
+    if x <= knots[0] or x >= knots[-1]:
+        return 0 if x <= knots[0] else len(knots) - 2
     low, high = 0, len(knots)
     while high - low > 1:
         middle = (low + high) // 2
