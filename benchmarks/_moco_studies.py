@@ -122,8 +122,9 @@ def markers(folder: Path, _: Path) -> None:
         reference.marker_weights.objects.append(osimlite.MarkerWeight(name=name, weight=weight))
     phase = _between(0.0, 1.0)
     phase.goals = [osimlite.MocoMarkerTrackingGoal(name="markers", markers_reference=reference)]
-    # opensim-core's example asks Moco for the exact Hessian, which takes its differences more than six minutes.
-    _study(folder, model, phase, num_mesh_intervals=50)
+    # Without the second derivatives neither ends; Moco takes them by differences, and more than six minutes for the
+    # 50 intervals of opensim-core's example.
+    _study(folder, model, phase, num_mesh_intervals=10, optim_hessian_approximation="exact")
 
 
 def track(intervals: int) -> Callable[[Path, Path], None]:

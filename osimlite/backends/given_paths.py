@@ -101,15 +101,18 @@ class SearchedPaths:
     """
 
     def __init__(self, mechanism: Mechanism, forces: Forces, order: Sequence[int]) -> None:
+        owners: list[Any] = [item for item in forces.elements if _is_searched(item)]
+        self.forces, self.given, self.names, self.size = forces, list[GivenPath](), tuple[str, ...](), 0
+        if not owners:
+            return
         self._order = list(order)
         self._still = np.zeros(len(mechanism.coordinates))
         self._default = np.array([info.default_value for info in mechanism.coordinates])
-        owners: list[Any] = [item for item in forces.elements if _is_searched(item)]
         self._system = PathSystem(
             mechanism.released(), Forces(tuple(MeasuredPath(item.path, item.place) for item in owners))
         )
         poses = self._poses(mechanism)
-        arms = np.abs(self._system.pulled(poses)).max(axis=0) if owners else np.zeros((0, len(self._still)))
+        arms = np.abs(self._system.pulled(poses)).max(axis=0)
         moved = [[k for k in self._order if row[k] > 0.0] for row in arms]
         self.given = [GivenPath(coordinates) for coordinates in moved]
         self._groups = _apart(moved)

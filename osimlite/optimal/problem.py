@@ -287,7 +287,9 @@ class Problem(Asked):
     def _terms(self, goal: MocoGoal) -> Terms:
         module = self._found(goal, "goals", "goals")
         for factor in goal.scale_factors:
-            raise self.refused(factor, "scale factors are not found here yet")
+            # Which column each is for is known to OpenSim's method alone that adds it.
+            message = "scale factors are not applied; no file says of what they are, and OpenSim applies none it reads"
+            raise self.refused(factor, message)
         terms: Terms = module.terms(goal, self)
         if goal.mode is not None and goal.mode not in terms.modes:
             raise self.wrong(goal, f"it cannot be of mode '{goal.mode}', as in Moco; it is a {terms.modes[0]}")

@@ -255,51 +255,45 @@ class Program:
         states, controls = layout.names["states"], layout.names["controls"]
         scheme, count = grid.scheme, len(layout.names["states"])
         start_of = np.zeros(len(grid.places), dtype=int)
-        for sort, first in zip(self.sorts, self._offsets, strict=False):
-            start_of[sort.numbers] = first + sort.rows * np.arange(len(sort.numbers))
+        for sort, offset in zip(self.sorts, self._offsets, strict=False):
+            start_of[sort.numbers] = offset + sort.rows * np.arange(len(sort.numbers))
         a: list[tuple[Any, Any, Any]] = []
         b: list[tuple[Any, Any, Any]] = []
-        times: list[float] = []
-        limits: list[tuple[float, float]] = []
-        row, moved = 0, len(layout.names["projections"])
-        interpolates = self.problem.solver.interpolate_control_mesh_interior_points
-        for interval, length in enumerate(grid.lengths):
-            points = grid.points_of(interval)
-            middle = 0.5 * (grid.places[points[0]] + grid.places[points[-1]])
-            for own, rate in zip(scheme.states, scheme.rates, strict=True):
-                rows = row + np.arange(count)
-                for k, point in enumerate(points):
-                    places, at = layout.places_of["states"][point], np.arange(count)
-                    if point == points[-1] and moved:
-                        # What the interval leads to is moved onto the constraints afterwards.
-                        places = np.concatenate([layout.places_of["projections"][point], places[moved:]])
-                        at = np.concatenate([count + at[:moved], at[moved:]])
-                    if own[k]:
-                        a.append((rows, places, np.full(count, own[k])))
-                    if rate[k]:
-                        b.append((rows, start_of[point] + at, np.full(count, length * rate[k])))
-                self.labels += [f"{name} defect" for name in states]
-                times += [middle] * count
-                limits += [(0.0, 0.0)] * count
-                row += count
-            for line in scheme.controls if interpolates else ():
-                rows = row + np.arange(len(controls))
-                for k, point in enumerate(points):
-                    if line[k]:
-                        a.append((rows, layout.places_of["controls"][point], np.full(len(controls), line[k])))
-                self.labels += [f"{name} between nodes" for name in controls]
-                times += [middle] * len(controls)
-                limits += [(0.0, 0.0)] * len(controls)
-                row += len(controls)
+        lines = scheme.controls if self.problem.solver.interpolate_control_mesh_interior_points else ()
+        many, moved = len(grid.lengths), len(layout.names["projections"])
+        points = np.array([grid.points_of(interval) for interval in range(many)])
+        labels = [f"{name} defect" for name in states] * len(scheme.states)
+        labels += [f"{name} between nodes" for name in controls] * len(lines)
+        first = len(labels) * np.arange(many)[:, None]
+        for number, pair in enumerate(zip(scheme.states, scheme.rates, strict=True)):
+            rows, at = first + number * count + np.arange(count), np.arange(count)
+            for k, (own, rate) in enumerate(zip(*pair, strict=True)):
+                places, of = layout.places_of["states"][points[:, k]], at
+                if moved and k == len(points[0]) - 1:
+                    # What the interval leads to is moved onto the constraints afterwards.
+                    ends = layout.places_of["projections"][points[:, k]]
+                    places, of = np.hstack([ends, places[:, moved:]]), np.concatenate([count + at[:moved], at[moved:]])
+                if own:
+                    a.append((rows, places, np.full(rows.shape, own)))
+                if rate:
+                    each = np.broadcast_to(grid.lengths[:, None] * rate, rows.shape)
+                    b.append((rows, start_of[points[:, k]][:, None] + of, each))
+        for number, line in enumerate(lines):
+            rows = first + len(scheme.states) * count + number * len(controls) + np.arange(len(controls))
+            for k in np.flatnonzero(line).tolist():
+                a.append((rows, layout.places_of["controls"][points[:, k]], np.full(rows.shape, line[k])))
+        self.labels += labels * many
+        middles = 0.5 * (grid.places[points[:, 0]] + grid.places[points[:, -1]])
+        times, row = [np.repeat(middles, len(labels))], len(labels) * many
+        limits: list[tuple[float, float]] = [(0.0, 0.0)] * row
         for sort in self.sorts:
-            many = len(sort.labels)
-            for point in sort.numbers:
-                first = start_of[point] + count + sort.projected
-                b.append((row + np.arange(many), first + np.arange(many), np.ones(many)))
-                self.labels += sort.labels
-                times += [grid.places[point]] * many
-                limits += sort.limits
-                row += many
+            each, size = np.arange(len(sort.labels)), len(sort.labels) * len(sort.numbers)
+            of = start_of[sort.numbers][:, None] + count + sort.projected + each
+            b.append((row + np.arange(size), of, np.ones(size)))
+            self.labels += sort.labels * len(sort.numbers)
+            times.append(np.repeat(grid.places[sort.numbers], len(sort.labels)))
+            limits += sort.limits * len(sort.numbers)
+            row += size
         self._rows = row
         for k, (_, terms) in enumerate(self.integrals):
             for sort in self.sorts:
@@ -309,22 +303,24 @@ class Program:
         size = row + len(self.integrals)
 
         def matrix(parts: list[tuple[Any, Any, Any]], width: int) -> Any:
-            found: list[Any] = [np.concatenate([part[k] for part in parts]) if parts else [] for k in range(3)]
+            found: list[Any] = [
+                np.concatenate([np.ravel(part[k]) for part in parts]) if parts else [] for k in range(3)
+            ]
             return sparse.csr_matrix((found[2], (found[0], found[1])), shape=(size, width))
 
         self._a, self._b = matrix(a, len(layout.lower)), matrix(b, int(self._offsets[-1]))
-        self.times = np.array(times)
+        self.times = np.concatenate(times)
         self.lower, self.upper = (np.array([limit[k] for limit in limits]) for k in range(2))
 
     def _entries(self, rows: str, columns: str) -> tuple[Array, Array]:
         """Of the derivatives of all points: which rows and columns their numbers belong to."""
         first, second = [], []
         for sort, start in zip(self.sorts, self._offsets, strict=False):
-            r, c = getattr(sort, rows), getattr(sort, columns)
-            for k in range(len(sort.numbers)):
-                places = np.concatenate([np.arange(self.layout.shared), sort.columns[k]])
-                first.append(start + sort.rows * k + r if rows == "jacobian_rows" else places[r])
-                second.append(places[c])
+            r, c, count = getattr(sort, rows), getattr(sort, columns), len(sort.numbers)
+            places = np.hstack([np.tile(np.arange(self.layout.shared), (count, 1)), sort.columns])
+            own = start + sort.rows * np.arange(count)[:, None] + r if rows == "jacobian_rows" else places[:, r]
+            first.append(own.ravel())
+            second.append(places[:, c].ravel())
         return np.concatenate(first), np.concatenate(second)
 
     def _map_jacobian(self) -> None:

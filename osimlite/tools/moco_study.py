@@ -48,7 +48,7 @@ def telling(outcome: Outcome) -> Callable[[Progress], None] | None:
 
 def report(job: Job, problem: Problem, solution: MocoSolution, outcome: Outcome) -> None:
     """Say what came out of a search, and what a report shows of it."""
-    outcome.done = solution.success
+    outcome.done, outcome.title = solution.success, job.setup.name
     outcome.summary |= {
         "objective": solution.objective,
         "terms": solution.terms,

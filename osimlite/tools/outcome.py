@@ -39,6 +39,7 @@ class Outcome:
     # what the check of the setup and of what it names found beside errors; what has a suggestion first
     warnings: list[Finding] = field(default_factory=list)
     evidence: Evidence | None = None  # what a report shows besides
+    title: str = ""  # of a report of this alone, in the place of its folder's name
     progress: Callable[[str], None] | None = None  # is told, line by line, how far a long search has come
     done: bool = True  # whether the tool did what it was asked for; what it found is written all the same
     _texts: dict[Path, Iterable[str]] = field(default_factory=dict)

@@ -92,8 +92,9 @@ class _Line(NamedTuple):
 def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
     """Write a report of what runs gave, as one page (HTML) that needs nothing else.
 
-    Setups of one folder are one trial; several trials, and the left and right side, are drawn over each other. With
-    measured loads curves go over the gait cycle, from each strike of a foot to its next.
+    Setups of one folder are one trial, which has its name (a study of Moco alone has its own); several trials, and the
+    left and right side, are drawn over each other. With measured loads curves go over the gait cycle, from each strike
+    of a foot to its next.
 
     Args:
         outcomes: of the runs by their setups.
@@ -122,7 +123,9 @@ def _trials(outcomes: Mapping[str | Path, Outcome]) -> list[Trial]:
     by_folder: dict[Path, list[Outcome]] = {}
     for setup, outcome in outcomes.items():
         by_folder.setdefault(Path(setup).resolve().parent, []).append(outcome)
-    return [Trial(folder.name, group) for folder, group in by_folder.items()]
+    titles = [outcome.title for outcome in outcomes.values()]
+    alone = titles[0] if len(titles) == 1 else ""
+    return [Trial(alone or folder.name, group) for folder, group in by_folder.items()]
 
 
 def _parts(trials: Sequence[Trial]) -> Iterator[str]:

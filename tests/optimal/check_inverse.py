@@ -94,7 +94,7 @@ def test_setups_are_run_and_tell_the_motion_too(tmp_path):
     assert outcome.done
     assert ("not simulated", "the motion was given") in outcome.told
     page = osimlite.report({tmp_path / "setup.xml": outcome}, tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "<h2>Controls</h2>" in page and "<h2>Contact forces</h2>" not in page
+    assert "<h1>squat</h1>" in page and "<h2>Controls</h2>" in page and "<h2>Contact forces</h2>" not in page
     table = outcome.tables["squat_solution.sto"]
     assert {"/jointset/hip_r/hip_flexion_r/value", "/jointset/hip_r/hip_flexion_r/speed"} <= {*table.columns}
     speed = np.gradient(table["/jointset/hip_r/hip_flexion_r/value"], table.times)
