@@ -75,9 +75,11 @@ def test_every_output(corpus: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPat
         largest = np.nanmax(np.abs(wanted.rows), axis=0, initial=0.0)
         for index, column in enumerate(wanted.columns):
             apart = np.abs(mine.rows[:, index] - wanted.rows[:, index])
-            # What a stiff tendon stores is as exact as OpenSim's equilibrium, which ends at 1e-8 of a force.
+            # What a stiff tendon stores is as exact as OpenSim's equilibrium, which ends at 1e-8 of a force; what
+            # fibers bear by their velocity as its search for that, which ends at 1e-10.
             near = 1e-6 if column.endswith("potential_energy") else 1e-8
-            assert apart.max() <= near * largest[index] + near, column
+            small = max(near, 1e-6 if "fiber" in column else 0.0)
+            assert apart.max() <= near * largest[index] + small, column
 
 
 def test_what_is_no_number_is_left_out_and_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

