@@ -41,12 +41,12 @@ class Fit:
 
     Args:
         model: with polynomials for paths.
-        functions: of it, with the numbers as parameters.
+        tangents: of it, with the numbers as parameters.
         initial: state that all motions start from.
     """
 
-    def __init__(self, model: Any, functions: Any, initial: Any, accuracy: float = ACCURACY) -> None:
-        self.model, self.functions = model.copy_deep(), functions
+    def __init__(self, model: Any, tangents: Any, initial: Any, accuracy: float = ACCURACY) -> None:
+        self.model, self.tangents = model.copy_deep(), tangents
         self._setters = [place.setter(self.model) for name in NAMES for place in places(self.model, name)]
         self._true = np.array([setter.get() for setter in self._setters])
         self._choices = {"accuracy": accuracy, "controls": CONTROLS, "initial": initial}
@@ -67,7 +67,7 @@ class Fit:
     def slopes(self, factors: Any) -> Any:
         """Their derivatives by the factors."""
         self._put(factors)
-        found = osimlite.sensitivity(self.model, self.functions, TO, **self._choices)
+        found = osimlite.sensitivity(self.model, self.tangents, TO, **self._choices)
         rows = found.derivatives[:, [found.states.index(name) for name in ANGLES]]
         return rows.reshape(-1, len(NAMES)) * self._true / NOISE
 
@@ -76,10 +76,9 @@ def main(words: list[str]) -> None:
     """Print a table in Markdown."""
     file = Path(words.pop(0)) if words and not words[0].isdigit() else MODEL
     model = osimlite.modify(osimlite.read(file), paths="polynomial")
-    started = time.perf_counter()
-    functions = osimlite.casadi(model, NAMES)
-    _ = functions.dynamics
-    print(f"functions made in {time.perf_counter() - started:.2g} s\n")
+    started = time.process_time()
+    tangents = osimlite.tangents(model, NAMES)
+    print(f"tangents made in {time.process_time() - started:.2g} s\n")
     first = osimlite.simulate(model, 0.001, "compiled", equilibrate=True)
     initial = {path: float(column[0]) for path, column in first.auxiliary.items()}
     ways: dict[str, tuple[float, dict[str, Any]]] = {
@@ -96,14 +95,14 @@ def main(words: list[str]) -> None:
         noise = rng.normal(size=2 * (round(TO / 0.01) + 1))
         for size in (0.0, 1.0):
             for name, (accuracy, more) in ways.items():
-                measured = Fit(model, functions, initial, 1e-9).angles(np.ones(len(NAMES)))
-                fit = Fit(model, functions, initial, accuracy)
+                measured = Fit(model, tangents, initial, 1e-9).angles(np.ones(len(NAMES)))
+                fit = Fit(model, tangents, initial, accuracy)
                 fit.measured = measured + size * NOISE * noise
-                started = time.perf_counter()
+                started = time.process_time()
                 found = least_squares(
                     fit.angles, start, bounds=(1.0 - WITHIN, 1.0 + WITHIN), **{"jac": fit.slopes, **more}
                 )
-                seconds = time.perf_counter() - started
+                seconds = time.process_time() - started
                 off = 100.0 * np.abs(found.x - 1.0)
                 residual = np.sqrt(2.0 * found.cost / len(fit.measured))
                 print(

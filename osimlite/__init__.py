@@ -3,8 +3,8 @@
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``, ``validate``,
 ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``, ``Feedback``,
 ``inverse_kinematics``, ``FrameSolver``, ``scale``, ``fit``, ``kinematics``, ``inverse_dynamics``,
-``static_optimization``, ``casadi``, ``linearize``, ``sensitivity``, ``modify``, ``run``, ``check_trial``, ``report``,
-the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``).
+``static_optimization``, ``casadi``, ``tangents``, ``linearize``, ``sensitivity``, ``modify``, ``run``, ``check_trial``,
+``report``, the errors, and every component class under OpenSim's own name (``osimlite.PinJoint``).
 Names are imported when first used, so that importing osimlite costs nothing.
 """
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from osimlite.backends.functions import casadi as casadi
     from osimlite.backends.linear import linearize as linearize
     from osimlite.backends.sensitivity import sensitivity as sensitivity
+    from osimlite.backends.tangents import tangents as tangents
     from osimlite.document.plugins import classes_in as classes_in
     from osimlite.document.printer import to_text as to_text
     from osimlite.document.printer import write as write
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
         "sensitivity",
         "simulate",
         "static_optimization",
+        "tangents",
         "to_mjcf",
         "to_text",
         "to_urdf",
@@ -96,6 +98,7 @@ _FUNCTIONS = {
     "fit": "osimlite.fitting.person",
     "scale": "osimlite.fitting.scale_tool",
     "linearize": "osimlite.backends.linear",
+    "tangents": "osimlite.backends.tangents",
     "sensitivity": "osimlite.backends.sensitivity",
     "modify": "osimlite.modifying.words",
     "mechanism": "osimlite.multibody:build_mechanism",

@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from osimlite.backends.stated import StatedModel
 from osimlite.errors import SettingError, UnsupportedError
 from osimlite.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.spatial import Array
-from osimlite.records import replace
 from osimlite.schema.model import Model, expect_model
-from osimlite.simulation.constrained import kept_state
-from osimlite.simulation.elements import force_elements
+from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.pack import Packed, pack
-from osimlite.simulation.states import StateLayout, in_model_order
+from osimlite.simulation.states import in_model_order
 from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ def casadi(model: Model, parameters: Iterable[str] = (), folder: str | Path | No
     return CasadiModel(model, tuple(parameters), Path(folder or "."))
 
 
-class CasadiModel:
+class CasadiModel(StatedModel):
     """Functions of CasADi (``casadi.Function``), each made when it is first asked for.
 
     All are functions of columns: time t (s); the state x, named by `states`; its derivative xdot; the controls u of the
@@ -59,53 +58,15 @@ class CasadiModel:
     the parameters p, named by `parameters`. Units are those of OpenSim's files of states: m, rad, s, N.
     Where a result does not exist (a joint stands where its rates are not defined), it is not a number.
 
-    Args:
-        model: what moves.
-        parameters: paths of numbers that stay symbols.
-        folder: of the model's file.
-        apart: whether bodies that never move in one another are links of their own.
-
-    Attributes:
-        name: of the model.
-        states: the entries of x as in ``states.sto``: values, speeds, and then auxiliary states, each in the order of
-            the model. Coordinates that are locked are none.
-        controls: the entries of u: paths of the actuators.
-        parameters: the entries of p.
-        p: the values (p,) that the model has for these.
-        x: the state (x,) that the model starts from, where its constraints hold.
-        u: controls (u,) of zero.
-        coordinates: paths of the coordinates whose accelerations are found, in the order of the speeds.
-        constraints_kept: how many equations constrain the motion.
+    The arguments and attributes are those of :class:`osimlite.backends.stated.StatedModel`.
     """
 
     def __init__(self, model: Model, parameters: Sequence[str], folder: Path, *, apart: bool = False) -> None:
         # Before all else: it says what is missing.
         from osimlite.backends.symbols import casadi as library
 
-        self._library, self._folder, self._model = library, folder, model
-        # Whether bodies stay apart decides what is linear in masses and places.
-        self._apart = apart or bool(parameters)
-        self._take(model)
-        self.name = model.name or "model"
-        self.parameters = tuple(parameters)
-        infos = self.mechanism.coordinates
-        own = [f"{infos[place].path}/{what}" for what in ("value", "speed") for place in self._packed.order]
-        moving, paths = len(own), self._state.paths
-        self.coordinates = tuple(path.rpartition("/")[0] for path in in_model_order(model, own[: moving // 2]))
-        values, speeds = ([f"{path}/{what}" for path in self.coordinates] for what in ("value", "speed"))
-        self.states = (*values, *speeds, *in_model_order(model, paths))
-        names = {name: place for place, name in enumerate([*own, *paths])}
-        self._places = [names[name] for name in self.states]
-        self.controls = self.forces.controls.names
-        self.u = np.zeros(len(self.controls))
-        start, rates = kept_state(
-            self.mechanism, [i.default_value for i in infos], [i.default_speed for i in infos], (), ()
-        )
-        self.x = np.array(self._state.pack(start.tolist(), rates.tolist()))[self._places]
-        self._parameters = self._symbolic(model)
-        self.p = self._parameters.values if self._parameters else np.zeros(0)
-        at_equations = self._packed.structure[MODEL.CONSTRAINED]
-        self.constraints_kept = int(self._packed.structure[at_equations + CONSTRAINED.EQUATIONS]) if at_equations else 0
+        self._library = library
+        super().__init__(model, parameters, folder, apart=apart)
         self._symbols = {
             "t": library.SX.sym("t"),
             "x": library.SX.sym("x", len(self.states)),
@@ -120,53 +81,34 @@ class CasadiModel:
         # What has no formula is refused at once.
         self._traced  # noqa: B018
 
-    def _take(self, model: Model) -> None:
-        self.mechanism: Mechanism = build_mechanism(model)
-        self._searched = self._searched_of(model, self.mechanism)
-        self.forces = self._searched.forces
-        self._packed: Packed = pack(self.mechanism, self.forces, apart=self._apart)
-        self._state = StateLayout(self.mechanism, self._packed.order, self.forces.elements)
+    def _forces_of(self, model: Model, mechanism: Mechanism) -> Forces:
+        self._searched = self._searched_of(model, mechanism)
+        return self._searched.forces
 
     def _searched_of(self, model: Model, mechanism: Mechanism) -> SearchedPaths:
         """The forces, and those of their paths whose way is searched for."""
         from osimlite.backends.given_paths import SearchedPaths
 
-        forces = force_elements(model, mechanism, folder=self._folder)
-        # Probes are outputs, whatever they make of their results over time; some look at more than the kernels.
-        kept = (e for e in forces.elements if not (isinstance(e, DeclaredProbe) and e.kind.measure))
-        elements = (replace(e, operation="value") if isinstance(e, DeclaredProbe) else e for e in kept)
-        forces = replace(forces, elements=tuple(elements))
         infos = mechanism.coordinates
         moving = [k for k, info in enumerate(infos) if not info.locked]
         paths = in_model_order(model, [f"{infos[k].path}/value" for k in moving])
         places = {f"{infos[k].path}/value": k for k in moving}
-        return SearchedPaths(mechanism, forces, [places[path] for path in paths])
+        return SearchedPaths(mechanism, super()._forces_of(model, mechanism), [places[path] for path in paths])
 
     @property
     def searched(self) -> tuple[str, ...]:
         """Paths of the forces along paths around surfaces, whose way is searched for."""
         return self._searched.names
 
-    def _symbolic(self, model: Model) -> Any:
-        if not self.parameters:
-            return None
-        from osimlite.backends.parameters import Parameters
-
-        structure = self._packed.structure
-
-        def numbers_of(changed: Model) -> Array:
-            mechanism = build_mechanism(changed)
-            searched = self._searched_of(changed, mechanism)
-            packed = pack(mechanism, searched.forces, apart=self._apart)
-            if not np.array_equal(packed.structure, structure):
-                return np.zeros(0)
-            # Ways that are searched for may not change: lengths are no lines over anything.
-            ways = (
-                [searched.measured(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)] if searched.size else []
-            )
-            return np.concatenate((packed.numbers, *_fixed_numbers(mechanism, packed), *ways))
-
-        return Parameters(model.copy_deep(), self.parameters, numbers_of)
+    def _numbers_of(self, changed: Model) -> Array:
+        mechanism = build_mechanism(changed)
+        searched = self._searched_of(changed, mechanism)
+        packed = pack(mechanism, searched.forces, apart=self._apart)
+        if not np.array_equal(packed.structure, self._packed.structure):
+            return np.zeros(0)
+        # Ways that are searched for may not change: lengths are no lines over anything.
+        ways = [searched.measured(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)] if searched.size else []
+        return np.concatenate((packed.numbers, *_fixed_numbers(mechanism, packed), *ways))
 
     # ----------------------------------------------------------------------------------------------- tracing
     @cached_property

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.backends.functions import CasadiModel
+from osimlite.backends.functions import CasadiModel, casadi
+from osimlite.backends.tangents import TangentModel, tangents
 from osimlite.errors import SettingError
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
-from osimlite.schema.model import Model, expect_model
+from osimlite.schema.model import Model
 from osimlite.text import did_you_mean
 
 Given = Mapping[str, float] | Sequence[float] | None
@@ -52,7 +53,7 @@ class Linearization:
 
 
 def linearize(
-    model: Model | CasadiModel,
+    model: Model | TangentModel | CasadiModel,
     state: Given = None,
     controls: Given = None,
     *,
@@ -66,7 +67,8 @@ def linearize(
     that fulfil them.
 
     Args:
-        model: that moves, or its functions (:func:`osimlite.casadi`), which are made once then.
+        model: that moves; or what is made of it once for many states: its tangents (:func:`osimlite.tangents`), or
+            its functions (:func:`osimlite.casadi`), which outputs need.
         state: numbers by the names of states, the others as the model has them, or all (x,) in their order.
         controls: numbers by the paths of actuators, the others 0, or all (u,).
         outputs: what is observed, in the order of y: groups of `CasadiModel.output_names` (``mass_center``), or single
@@ -77,18 +79,22 @@ def linearize(
     Raises:
         SettingError: there is no such state, control or output.
 
-    Other errors are those of :func:`osimlite.casadi`.
+    Other errors are those of :func:`osimlite.tangents`, and with outputs of :func:`osimlite.casadi`.
     """
-    if not isinstance(model, CasadiModel):
-        expect_model(model)
-        model = CasadiModel(model, (), Path(folder or "."))
+    if not isinstance(model, TangentModel | CasadiModel):
+        model = (casadi if outputs else tangents)(model, (), folder)
     x = _filled("state", model.states, model.x, state)
     u = _filled("control", model.controls, model.u, controls)
-    xdot, a, b = (np.array(part.full()) for part in model.linear(time, x, u, model.p))
-    chosen = _chosen(model, outputs) if outputs else []
-    y, c, d = _observed(model, chosen, time, x, u)
-    names = tuple(f"{group}:{model.output_names[group][k]}" for group, k in chosen)
-    return Linearization(model.states, model.controls, time, x, u, xdot[:, 0], a, b, names, y[:, 0], c, d)
+    xdot, a, b = (np.array(part) for part in model.linear(time, x, u, model.p))
+    y, c, d = (np.zeros((0, size)) for size in (1, len(x), len(u)))
+    names: tuple[str, ...] = ()
+    if outputs:
+        if not isinstance(model, CasadiModel):
+            raise SettingError("outputs need functions of CasADi; give those (osimlite.casadi), or the model")
+        chosen = _chosen(model, outputs)
+        y, c, d = _observed(model, chosen, time, x, u)
+        names = tuple(f"{group}:{model.output_names[group][k]}" for group, k in chosen)
+    return Linearization(model.states, model.controls, time, x, u, xdot.ravel(), a, b, names, y[:, 0], c, d)
 
 
 def _chosen(model: CasadiModel, names: Sequence[str]) -> list[tuple[str, int]]:
@@ -109,15 +115,13 @@ def _chosen(model: CasadiModel, names: Sequence[str]) -> list[tuple[str, int]]:
 
 def _observed(model: CasadiModel, chosen: Sequence[tuple[str, int]], time: float, x: Array, u: Array) -> list[Array]:
     """Outputs (y, 1), and their derivatives by the state and by the controls."""
-    if not chosen:
-        return [np.zeros((0, size)) for size in (1, len(x), len(u))]
-    from osimlite.backends.symbols import casadi
+    from osimlite.backends.symbols import casadi as library
 
-    state, control = casadi.MX.sym("x", len(x)), casadi.MX.sym("u", len(u))
+    state, control = library.MX.sym("x", len(x)), library.MX.sym("u", len(u))
     columns = model.outputs.call({"t": time, "x": state, "u": control, "p": model.p})
-    y = casadi.vertcat(*(columns[group][k] for group, k in chosen))
-    slopes = [casadi.jacobian(y, of) for of in (state, control)]
-    found = casadi.Function("observed", [state, control], [y, *slopes])(x, u)
+    y = library.vertcat(*(columns[group][k] for group, k in chosen))
+    slopes = [library.jacobian(y, of) for of in (state, control)]
+    found = library.Function("observed", [state, control], [y, *slopes])(x, u)
     return [np.array(part.full()) for part in found]
 
 

@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.backends.functions import CasadiModel
 from osimlite.backends.parameters import number_of
+from osimlite.backends.stated import StatedModel
+from osimlite.backends.tangents import TangentModel, tangents
 from osimlite.errors import SettingError, SimulationError, UnsupportedError
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
@@ -30,14 +31,14 @@ from osimlite.sweep.properties import places
 from osimlite.text import did_you_mean
 
 CHOICES = {*PER_RUN, "folder"} - {"fixed_step", "integrator", "controller", "resume"}
-"""Options of `simulate` that leave the motion one of the functions of CasADi, in steps of Merson's method."""
+"""Options of `simulate` that leave the motion one of the rates as they are, in steps of Merson's method."""
 ACCURACY = 1e-6
 """That is taken where none is chosen."""
 LOOSER = 10.0
 """So many times the accuracy is what the error of a derivative may be in a step, over the largest by that number: less
 makes them no better, for the motion is not."""
 SAME = 1e-6
-"""What derivatives of the functions may be off from those of machine code, over the largest of a state or 1."""
+"""What rates of the tangents may be off from those of the motion, over the largest of a state or 1."""
 SHORTEST = 1e-9
 """Part of a step, s, to which a bend of the equations is narrowed down."""
 
@@ -83,7 +84,7 @@ class Sensitivity(Tabular):
 
 def sensitivity(
     model: Model,
-    parameters: Iterable[str] | CasadiModel = (),
+    parameters: Iterable[str] | StatedModel = (),
     to: float = 2.0,
     *,
     states: Iterable[str] = (),
@@ -96,8 +97,9 @@ def sensitivity(
 
     Args:
         model: what moves.
-        parameters: numbers of the model, by paths as :func:`osimlite.casadi` takes them; or its functions, for theirs,
-            so that they are made once for many motions. Their values are those in the model now.
+        parameters: numbers of the model, by paths as :func:`osimlite.tangents` takes them; or its tangents, so
+            that they are made once for many motions; or its functions (:func:`osimlite.casadi`), for their parameters.
+            Their values are those in the model now.
         to: how long, s.
         states: names of states (``/jointset/knee/flexion/value``) that the derivatives are by, too, at the start.
         choices: `accuracy`, `report_interval`, `initial`, `initial_speeds`, `equilibrate`, `controls`, `progress` and
@@ -106,13 +108,12 @@ def sensitivity(
             take less for more.
 
     Raises:
-        SettingError: there is no such number or state, or an option that does not go with this; the functions are
+        SettingError: there is no such number or state, or an option that does not go with this; the tangents are
             those of another model.
-        UnsupportedError: constraints bind the motion, a path runs around a surface, or a part of the model has no
-            formula.
+        UnsupportedError: constraints bind the motion, or a force is computed in Python.
         SimulationError: the motion ended, or a derivative of it is no finite number.
 
-    Other errors are those of :func:`osimlite.casadi` and :func:`osimlite.simulate`.
+    Other errors are those of :func:`osimlite.tangents` and :func:`osimlite.simulate`.
     """
     expect_model(model)
     for name in choices:
@@ -123,53 +124,52 @@ def sensitivity(
             )
     accuracy = choices["accuracy"] = choices.get("accuracy") or ACCURACY
     folder = Path(choices.get("folder") or ".")
-    functions = parameters if isinstance(parameters, CasadiModel) else CasadiModel(model, tuple(parameters), folder)
-    if functions.searched:
-        raise UnsupportedError(
-            f"'{functions.searched[0]}' runs around a surface, where derivatives jump; put a polynomial in its place "
-            "first (osimlite.modify(model, paths='polynomial'))"
-        )
-    initial = [_place("state", functions.states, name) for name in states]
-    for name in functions.parameters:
-        _require_held(model, functions, name)
-    p = np.array([number_of(model, name) for name in functions.parameters])
     with Simulation(model, "compiled", folder=folder) as simulation:
         if simulation.constraints:
             raise UnsupportedError(
                 f"'{simulation.constraints[0]}' constrains the motion, which is projected after each step; take it out "
                 "of the model, lock coordinates, or take `residual` and `constraints` of osimlite.casadi"
             )
+        if isinstance(parameters, TangentModel):
+            made = parameters
+        else:
+            made = tangents(model, parameters.parameters if isinstance(parameters, StatedModel) else parameters, folder)
+        initial = [_place("state", made.states, name) for name in states]
+        for name in made.parameters:
+            _require_held(model, made, name)
+        made.take(np.array([number_of(model, name) for name in made.parameters]))
         trajectory = simulation.run(to, **{name: choices[name] for name in choices if name != "folder"})
-        motion = _Followed(functions, simulation, p, initial)
+        motion = _Followed(made, simulation, initial)
         rows = motion.rows(trajectory, accuracy)
-    names = *functions.parameters, *(functions.states[k] for k in initial)
-    return Sensitivity(trajectory, trajectory.times, functions.states, names, motion.states(trajectory), rows)
+    names = *made.parameters, *(made.states[k] for k in initial)
+    return Sensitivity(trajectory, trajectory.times, made.states, names, motion.states(trajectory), rows)
 
 
 class _Followed:
     """The derivatives along the steps of a motion.
 
     Args:
-        functions: of the model.
+        made: tangents of the model, with the parameters that it has.
         simulation: of it, with the controls of the motion.
-        p: the parameters (p,).
         initial: places of the states of which the start counts.
     """
 
-    def __init__(self, functions: CasadiModel, simulation: Simulation, p: Array, initial: Sequence[int]) -> None:
-        self._functions, self._simulation, self._p, self._initial = functions, simulation, p, initial
-        self._engine: Any = simulation.engine
+    def __init__(self, made: TangentModel, simulation: Simulation, initial: Sequence[int]) -> None:
+        self._made, self._simulation, self._initial = made, simulation, initial
+        engine: Any = simulation.engine
+        self._engine = engine
         infos, order = simulation.mechanism.coordinates, self._engine.order
         moving = [f"{infos[place].path}/{what}" for what in ("value", "speed") for place in order]
         known = [*moving, *(variable.path for variable in simulation.state.variables if variable.is_named)]
-        if {*known} != {*functions.states} or functions.controls != simulation.forces.controls.names:
-            raise SettingError("the functions are of another model; make them of this one")
+        if {*known} != {*made.states} or made.controls != simulation.forces.controls.names:
+            raise SettingError("the tangents are of another model; make them of this one")
         own = [*moving, *simulation.state.paths]
-        self._places = [own.index(name) for name in functions.states]
-        self._step = _step(functions, len(p) + len(initial))
+        self._places = [own.index(name) for name in made.states]
+        count = len(made.parameters)
+        self._steps = made.steps(engine.driving, np.eye(count, count + len(initial)))
 
     def states(self, trajectory: Trajectory) -> Array:
-        """The motion (n, x), in the order of the functions."""
+        """The motion (n, x), in the order of the tangents."""
         return self._rows(trajectory)[:, self._places]
 
     def _rows(self, trajectory: Trajectory) -> Array:
@@ -178,104 +178,67 @@ class _Followed:
 
     def rows(self, trajectory: Trajectory, accuracy: float) -> Array:
         """The derivatives (n, x, k) at the times of the motion."""
-        # Parts of steps share their ends.
-        self._driven = dict[float, list[float]]()
-        self._start = start = self._rows(trajectory)[0].tolist()
+        start = self._rows(trajectory)[0].tolist()
         wanted = trajectory.times.tolist()
         times, states, ended = self._simulation.every_step(0.0, start, wanted[-1], Settings(accuracy))
         if ended is not None:
             raise ended
-        count = len(self._p)
-        y = np.zeros((len(self._places), 1 + count + len(self._initial)))
-        y[self._initial, range(1 + count, y.shape[1])] = 1.0
-        result, row = np.zeros((len(wanted), len(y), y.shape[1] - 1)), 1
-        result[0] = y[:, 1:]
+        count, initial = len(self._made.parameters), self._initial
+        result, row = np.zeros((len(wanted), len(self._places), count + len(initial))), 1
+        result[0, initial, range(count, count + len(initial))] = 1.0
+        rows = np.array(states)[:, self._places]
+        y = self._steps.blocks(rows[0], result[0])
+        # The steps are those of the motion, each from where that was.
+        values = [self._steps.blocks(state, result[0])[0, :, 0] for state in rows]
         for place in (0, len(times) // 2, -1):
             self._require_same(times[place], states[place])
-        for (t, state), (end, _) in pairwise(zip(times, states, strict=True)):
-            y[:, 0] = np.asarray(state)[self._places]
+        for (t, state), (end, _) in pairwise(zip(times, values, strict=True)):
+            y[:, :, 0] = state
             while row < len(wanted) and wanted[row] <= end:
                 y, t = self._stepped(t, wanted[row], y, accuracy), wanted[row]
-                result[row], row = y[:, 1:], row + 1
+                result[row], row = self._steps.slopes(y), row + 1
             if t < end:
                 y = self._stepped(t, end, y, accuracy)
         return result
 
     def _stepped(self, t0: float, t1: float, y0: Array, accuracy: float) -> Array:
-        """State and derivatives at the end of a step, in as many parts as the accuracy of the derivatives needs."""
+        """The blocks at the end of a step, in as many parts as the accuracy of the derivatives needs."""
         h = t1 - t0
-        controls = [self._controls(t) for t in (t0, t0 + h / 3.0, t0 + h / 2.0, t1)]
-        y, error = (part.full() for part in self._step(t0, h, y0, np.array(controls).T, self._p))
-        if not np.isfinite(y).all():
-            worst = self._functions.states[int(np.nonzero(~np.isfinite(y))[0][0])]
+        y, error = self._steps.step(t0, t1, y0)
+        size = np.abs(y)
+        if not np.isfinite(size.sum()):
+            worst = self._made.states[int(np.nonzero(~np.isfinite(self._steps.slopes(y)).all(axis=1))[0][0])]
             raise SimulationError(f"between {t0:g} and {t1:g} s the derivatives of '{worst}' are no finite numbers")
         # As the integrator weighs states; of each number, what counts is its largest derivative.
-        weights = 1.0 / np.maximum(1.0, np.abs(y0[:, :1]))
-        sizes = (np.maximum(np.abs(y0), np.abs(y)) * weights)[:, 1:].max(axis=0)
-        if h > SHORTEST and np.any((np.abs(error) * weights)[:, 1:] > LOOSER * accuracy * sizes):
+        before = np.abs(y0)
+        weights = 1.0 / np.maximum(1.0, before[:, :, :1])
+        sizes = (np.maximum(before, size) * weights).max(axis=1)
+        errors = (np.abs(error) * weights).max(axis=1)
+        if h > SHORTEST and (errors > LOOSER * accuracy * sizes)[:, 1:].any():
             middle = t0 + h / 2.0
             return self._stepped(middle, t1, self._stepped(t0, middle, y0, accuracy), accuracy)
         return y
 
-    def _controls(self, t: float) -> list[float]:
-        """What drives the actuators at a time."""
-        if not self._simulation.forces.controls.names:
-            return []
-        if t not in self._driven:
-            self._engine.derivative(t, self._start)
-            self._driven[t] = self._engine.controls()
-        return self._driven[t]
-
     def _require_same(self, t: float, y: Sequence[float]) -> None:
-        """SettingError where the functions say another derivative of the state than machine code."""
+        """SettingError where the tangents say another derivative of the state than the motion has."""
         wanted = np.array(self._engine.derivative(t, y))[self._places]
-        found = self._functions.dynamics(t, np.asarray(y)[self._places], self._engine.controls(), self._p)
-        off = np.abs(found.full()[:, 0] - wanted)
+        state = np.asarray(y)[self._places]
+        found, _ = self._made.along(t, state, self._engine.controls(), np.zeros((len(state), 0)))
+        off = np.abs(found - wanted)
         if not np.all(off <= SAME * max(1.0, np.abs(wanted).max(initial=0.0))):
-            worst = self._functions.states[int(np.argmax(np.where(np.isfinite(off), off, np.inf)))]
+            worst = self._made.states[int(np.argmax(np.where(np.isfinite(off), off, np.inf)))]
             raise SettingError(
-                f"at {t:g} s the functions say another derivative of '{worst}' than the motion has; make them of this "
+                f"at {t:g} s the tangents say another derivative of '{worst}' than the motion has; make them of this "
                 "very model"
             )
 
 
-def _step(functions: CasadiModel, count: int) -> Any:
-    """``step(t, h, y, u, p) -> y, error``: one of Merson's steps, with its exact derivative.
-
-    y (x, 1 + count) are the state and its derivatives; the controls (u, 4) are those at the start, after a third, at
-    the middle and at the end.
-    """
-    from osimlite.backends.symbols import casadi
-
-    sizes = {"t": 1, "x": len(functions.states), "u": len(functions.controls), "p": len(functions.parameters)}
-    given = [casadi.SX.sym(name, size) for name, size in sizes.items()]
-    xdot = functions.dynamics(*given)
-    slopes = [casadi.jacobian(xdot, given[place]) for place in (1, 3)]
-    linear = casadi.Function("linear", given, [xdot, *slopes])
-    t, h, p = (casadi.MX.sym(name, size) for name, size in (("t", 1), ("h", 1), ("p", sizes["p"])))
-    y, u = casadi.MX.sym("y", sizes["x"], 1 + count), casadi.MX.sym("u", sizes["u"], 4)
-    own = casadi.DM(np.eye(sizes["p"], count))
-
-    def f(part: float, y: Any, control: int) -> Any:
-        xdot, a, b = linear(t + part * h, y[:, 0], u[:, control], p)
-        return casadi.horzcat(xdot, a @ y[:, 1:] + b @ own)
-
-    f0 = f(0.0, y, 0)
-    fa = f(1.0 / 3.0, y + h / 3.0 * f0, 1)
-    fb = f(1.0 / 3.0, y + h / 6.0 * (f0 + fa), 1)
-    fc = f(0.5, y + h / 8.0 * (f0 + 3.0 * fb), 2)
-    last = y + h / 2.0 * (f0 - 3.0 * fb + 4.0 * fc)
-    end = y + h / 6.0 * (f0 + 4.0 * fc + f(1.0, last, 3))
-    # What Merson takes for the error.
-    return casadi.Function("step", [t, h, y, u, p], [end, 0.2 * (end - last)])
-
-
-def _require_held(model: Model, functions: CasadiModel, name: str) -> None:
+def _require_held(model: Model, made: TangentModel, name: str) -> None:
     """SettingError for a number that says where a state starts."""
     for place in places(model, name):
         what = str(place.steps[0])
         state = f"{place.component}/{what.removeprefix('default_').removesuffix('_value')}"
-        if what.startswith("default_") and state in functions.states:
+        if what.startswith("default_") and state in made.states:
             raise SettingError(f"'{name}' is where a state starts, which is held; take '{state}' among the states")
 
 

@@ -15,6 +15,7 @@ from osimlite.backends.curves import curve_value_on_symbols, damped_velocity_on_
 from osimlite.backends.reader import Function, Kernel, name_of, stored
 from osimlite.backends.symbols import COUNTERPARTS, UNSET, NoFormula, Vector
 from osimlite.forces.bezier import curve_value
+from osimlite.forces.carried import is_nothing
 from osimlite.forces.millard2012_equilibrium import damped_velocity
 from osimlite.kernels import pointers
 from osimlite.kernels.functions import pieces_at
@@ -33,7 +34,6 @@ HELP = {
     "branch_": ways.Branch,
     "decide_": ways.decide,
     "fails_": ways.fails,
-    "is_nothing_": symbols.is_nothing,
     "unset_": UNSET,
 }
 """What the rewritten text calls."""
@@ -66,6 +66,7 @@ _known: dict[Any, Any] = {
     pointers.at: _at,
     pointers.call: _call,
     sine_cosine: symbols.sine_cosine,
+    is_nothing: symbols.is_nothing,
     curve_value: curve_value_on_symbols,
     damped_velocity: damped_velocity_on_symbols,
     pieces_at: pieces_on_symbols,
@@ -212,10 +213,6 @@ class _Writer(Kernel, ast.NodeTransformer):
         return node
 
     def visit_If(self, node: ast.If) -> Any:
-        if _is_shortcut(node):
-            self.generic_visit(node)
-            node.test = _call_of("is_nothing_", node.test.left)  # type: ignore[attr-defined]
-            return node
         part, is_failure = self._part(node), self._is_failure(node)
         leaves = any(map(_leaves, (*node.body, *node.orelse)))
         names = stored(*node.body, *node.orelse)
@@ -252,16 +249,6 @@ class _Writer(Kernel, ast.NodeTransformer):
                 kind = returns.value if isinstance(returns, ast.Constant) else getattr(returns, "id", "")
                 return kind == "int" and ast.unparse(value) != "OUTCOME.OK"
         return False
-
-
-def _is_shortcut(node: ast.If) -> bool:
-    """Whether a round of a loop is left out for a number that is 0, which would change nothing."""
-    match node:
-        case ast.If(
-            test=ast.Compare(ops=[ast.Eq()], comparators=[ast.Constant(value=0.0)]), body=[ast.Continue()], orelse=[]
-        ):
-            return True
-    return False
 
 
 def _leaves(node: ast.AST) -> bool:

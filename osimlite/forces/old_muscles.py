@@ -167,11 +167,11 @@ def fitted(path_length: float, length: float, m: OldMuscle) -> Guess:
     """Fibers of a length (m), or of that which leaves the tendon its slack length if it would be shorter."""
     cos = cos_upright(length, m.height)
     tendon = path_length - length * cos
-    if tendon >= m.slack:
-        return Guess(length, cos, tendon / m.slack - 1.0)
-    along = path_length - m.slack
-    cos = max(along / sqrt(along * along + m.height * m.height), UPRIGHT)
-    return Guess(max(along / cos, m.height), cos, 0.0)
+    if not tendon >= m.slack:
+        along, tendon = path_length - m.slack, m.slack
+        cos = max(along / sqrt(along * along + m.height * m.height), UPRIGHT)
+        length = max(along / cos, m.height)
+    return Guess(length, cos, tendon / m.slack - 1.0)
 
 
 def next_length(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from osimlite.forces.carried import settled
 from osimlite.forces.vectors import Vector, along, component, minus, norm, plus, unit
 from osimlite.kernels.pointers import Floats
 
@@ -43,6 +44,7 @@ def closest_point(radii: Vector, point: Vector) -> Vector:
     for _ in range(STEPS):
         value, slope = polynomial(t + aa, t + bb, t + cc, aauu, bbvv, ccww)
         if abs(value) < SMALL:
+            t = settled(t, value, slope)
             break
         t -= value / slope
     return aa * u / (t + aa), bb * v / (t + bb), cc * w / (t + cc)
@@ -91,14 +93,15 @@ def closest_on_ellipse(a: float, b: float, u: float, v: float) -> tuple[float, f
         return x, b * sqrt(abs(1.0 - (x / a) * (x / a)))
     aauu, bbvv = aa * (u * u), bb * (v * v)
     t = 0.0 if (u / a) * (u / a) + (v / b) * (v / b) < 1.0 else max(a, b) * sqrt(u * u + v * v)
-    P, Q = t + aa, t + bb
     for _ in range(STEPS):
         P, Q = t + aa, t + bb
         value = P * P * (Q * Q) - aauu * (Q * Q) - bbvv * (P * P)
+        slope = 2.0 * (P * Q * (P + Q) - aauu * Q - bbvv * P)
         if abs(value) < SMALL:
+            t = settled(t, value, slope)
             break
-        t -= value / (2.0 * (P * Q * (P + Q) - aauu * Q - bbvv * P))
-    return aa * u / P, bb * v / Q
+        t -= value / slope
+    return aa * u / (t + aa), bb * v / (t + bb)
 
 
 def fan(radii: Vector, start: Vector, chord: Vector, room: Floats) -> Vector:

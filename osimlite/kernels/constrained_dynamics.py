@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from osimlite.forces.carried import is_nothing
 from osimlite.kernels.dynamics import SMALLEST_PIVOT, solve
 from osimlite.kernels.layout import CONSTRAINED, DOF, ITEM, MODEL, OUTCOME
 from osimlite.kernels.least_squares import REDUNDANT, ROUNDING, apply_q, cholesky, factored, solved, substitute
@@ -100,7 +101,7 @@ def toward_ground(s: Ints, w: Floats, right: Floats) -> None:
     freedoms = at(s, s[MODEL.DOF_AT])
     for k in range(s[MODEL.DOFS] - 1, -1, -1):
         j, load = at(freedoms, DOF.SIZE * k), right[k]
-        if load == 0.0:
+        if is_nothing(load):
             continue
         row, i = at(w, j[DOF.ROW]), j[DOF.ABOVE]
         for m in range(1, j[DOF.DEPTH] + 1):

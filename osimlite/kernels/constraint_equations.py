@@ -87,8 +87,10 @@ def add_coordinate(s: Ints, y: Floats, f: Floats, coordinate: Ints, factor: floa
         return 0.0
     angles = at(s, ball)
     n = angle_row(y, angles, coordinate[2])
-    for k in range(3):
-        row[angles[k]] += factor * n[k]
+    one, two, three = n
+    row[angles[0]] += factor * one
+    row[angles[1]] += factor * two
+    row[angles[2]] += factor * three
     return factor * angle_drift(y, f, angles, n)
 
 

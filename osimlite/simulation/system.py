@@ -134,6 +134,11 @@ class System:
         self._bind()
         self._controls = controls
 
+    @property
+    def driving(self) -> Controls:
+        """The controls that drive the actuators."""
+        return self._controls
+
     def _rows(self, start: int, count: int, size: int) -> Floats:
         first, rows = self.structure[start], self.structure[count]
         return self._w[first : first + size * rows].reshape(rows, size)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.forces.carried import is_nothing, settled
 from osimlite.kernels.dynamics import evaluate
 from osimlite.kernels.layout import MODEL, STAGE, WORK
 from osimlite.simulation.elements.laws import law_function
@@ -72,17 +73,22 @@ class Jet:
         rate, value = math.log(b), b**self.v
         return self.through(value, rate * value, rate * rate * value)
 
+    def __mod__(self, b: Any) -> Jet:
+        rest = self.v % float(b)
+        times = round((self.v - rest) / float(b))
+        return self - times * b
+
     def __abs__(self) -> Jet:
         return -self if self.v < 0.0 else self
 
     def __float__(self) -> float:
-        return self.v
+        return float(self.v)
 
     def __int__(self) -> int:
         return int(self.v)
 
     def __bool__(self) -> bool:
-        return self.v != 0.0
+        return bool(self.v != 0.0)
 
     def __lt__(self, b: Any) -> bool:
         return self.v < float(b)
@@ -161,6 +167,19 @@ MATHEMATICS: dict[str, Callable[..., Any]] = {name: _of_one(name) for name in SL
 }
 
 
+def _settled(root: Any, error: Any, slope: Any) -> Any:
+    if not isinstance(error, Jet):
+        return root
+    by, own = 1.0 / float(slope), root if isinstance(root, Jet) else Jet(root, 0.0, 0.0, 0.0)
+    return Jet(own.v, own.g - by * error.g, own.a - by * error.a, own.h)
+
+
+def _is_nothing(number: Any) -> bool:
+    return number == 0.0 and not (isinstance(number, Jet) and (np.any(number.g) or number.a))
+
+
+SAID = {settled: _settled, is_nothing: _is_nothing}
+"""What laws say of derivatives."""
 OURS = "osimlite.forces", "osimlite.kernels", "osimlite.simulation.elements"
 """Where kernels and laws are."""
 
@@ -179,6 +198,9 @@ def _carried(functions: list[Any]) -> Iterator[None]:
             if getattr(value, "__module__", "") == "math":
                 changed.append((scope, name, value))
                 scope[name] = MATHEMATICS[value.__name__]
+            elif value is settled or value is is_nothing:
+                changed.append((scope, name, value))
+                scope[name] = SAID[value]
             elif getattr(value, "__module__", "").startswith(OURS) and hasattr(value, "__globals__"):
                 functions.append(value)
         changed.append((scope, "float", float))

@@ -106,7 +106,7 @@ def test_the_largest_kernel_needs_nothing_of_numba_to_run():
 
 
 def test_a_numba_that_is_otherwise_inside_is_told_in_a_sentence(monkeypatch):
-    def moved(function):
+    def moved(function, directions):
         raise AttributeError("'Library' object has no attribute '_final_module'")
 
     monkeypatch.setattr(compiler, "compiled", moved)

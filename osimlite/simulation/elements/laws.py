@@ -19,6 +19,14 @@ FORMS = {
     EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel", RESPONSE: "response_kernel", RIGID: "rigid_kernel",
     ABREAST: "abreast_kernel",
 }  # fmt: skip
+ALONG = "~"
+"""Between the name of a function and how many directions its numbers carry derivatives along."""
+
+
+def law_of(name: str) -> tuple[Callable[..., Any], int]:
+    """The function of a name, and how many directions its numbers carry derivatives along, 0 if they are floats."""
+    name, _, directions = name.partition(ALONG)
+    return law_function(name), int(directions or 0)
 
 
 def law_function(name: str) -> Callable[..., Any]:

@@ -13,6 +13,7 @@ fail where one of them has moved.
 from __future__ import annotations
 
 import dis
+import re
 from collections.abc import Iterator
 from functools import cache
 from inspect import signature
@@ -20,6 +21,7 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 from osimlite._require import require
+from osimlite.errors import UnsupportedError
 from osimlite.kernels import pointers
 from osimlite.kernels.layout import Record
 from osimlite.simulation.engines.object_code import machine
@@ -32,6 +34,8 @@ from numba.core import codegen, typed_passes, types, untyped_passes  # noqa: E40
 from numba.core.compiler import CompilerBase  # noqa: E402
 from numba.core.compiler_machinery import PassManager  # noqa: E402
 from numba.extending import intrinsic  # noqa: E402
+
+from osimlite.simulation.engines import tangents  # noqa: E402
 
 POINTERS: dict[str, Any] = {
     "Floats": types.CPointer(types.float64),  # type: ignore[no-untyped-call]
@@ -58,7 +62,7 @@ def _call(context: Any, address: Any, s: Any, x: Any, w: Any, y: Any, f: Any, pl
     return types.int64(types.int64, s, x, w, y, f, types.int64), generate
 
 
-INSTRUCTIONS: dict[Any, Any] = {pointers.at: _at, pointers.call: _call}
+INSTRUCTIONS: dict[Any, Any] = {pointers.at: _at, pointers.call: _call, **tangents.INSTRUCTIONS}
 """What stands in the place of functions that Python has and machine code has not."""
 
 
@@ -132,10 +136,24 @@ LEAN = {"error_model": "numpy", "_nrt": False, "pipeline_class": _Pipeline}
 """No exceptions where a number is divided by zero; nothing is allocated."""
 
 
-def compiled(function: Any) -> tuple[str, str]:
-    """Text and symbol of an entry."""
-    parts = [{**POINTERS, **NUMBERS}[part.annotation] for part in signature(function).parameters.values()]
-    entry = numba.cfunc(types.int64(*parts), nopython=True, **LEAN)(_linked(function))
+def compiled(function: Any, directions: int = 0) -> tuple[str, str]:
+    """Text and symbol of an entry; with directions, of one whose vectors carry their derivatives along so many.
+
+    Raises:
+        UnsupportedError: there is no rule for the derivatives of something in it.
+    """
+    kinds = {**POINTERS, **NUMBERS}
+    if directions:
+        kinds["Floats"] = tangents.Duals(tangents.Dual(directions))  # type: ignore[no-untyped-call]
+    parts = [kinds[part.annotation] for part in signature(function).parameters.values()]
+    try:
+        entry = numba.cfunc(types.int64(*parts), nopython=True, **LEAN)(_linked(function))
+    except numba.TypingError as error:
+        if not directions:
+            raise
+        told = re.sub(r"\x1b\[\d*m", "", str(error))
+        lines = (line for line in told.splitlines() if line and "Failed in" not in line)
+        raise UnsupportedError(f"'{function.__name__}' has no derivatives: {next(lines, '')}") from error
     whole = llvm.parse_assembly("")
     for module in entry._library.modules():
         whole.link_in(module)

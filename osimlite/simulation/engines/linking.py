@@ -17,7 +17,7 @@ from osimlite.kernels import pointers
 from osimlite.kernels.layout import MODEL, OUTCOME
 from osimlite.kernels.pointers import Ints
 from osimlite.kernels.table import LAW_NUMBERS
-from osimlite.simulation.elements.laws import law_function
+from osimlite.simulation.elements.laws import ALONG, law_function
 from osimlite.simulation.interrupts import defer_sigint
 from osimlite.simulation.pack import Packed
 
@@ -117,10 +117,41 @@ class _Compiled(Code):
         kinds = ctypes.c_int64, *[ctypes.c_double] * 4
 
         def called(*parts: int) -> int:
-            return python(*map(_view, parts, kinds, sizes), parts[5])
+            return python(*map(self._seen, parts, kinds, sizes), parts[5])
 
         callback = KERNEL(called)
         return int(ctypes.cast(callback, ctypes.c_void_p).value or 0), callback
+
+    def _seen(self, address: int, kind: Any, count: int) -> Any:
+        """The numbers at an address, as Python is given them."""
+        return _view(address, kind, count)
+
+
+class Tangents(_Compiled):
+    """Machine code whose numbers carry derivatives, along several directions at once.
+
+    All arrays of floats have a row for each number: the number, and its derivatives. Python is given the numbers alone.
+
+    Args:
+        directions: how many.
+    """
+
+    def __init__(self, directions: int) -> None:
+        super().__init__(f"machine code along {directions} directions")
+        self._width, self._suffix = 1 + directions, f"{ALONG}{directions}"
+
+    def make_ready(self, functions: Sequence[str]) -> None:
+        """Compile functions of the kernels together."""
+        super().make_ready([name + self._suffix for name in functions])
+
+    def address(self, function: str) -> int:
+        """Of a function of the kernels."""
+        return super().address(function + self._suffix)
+
+    def _seen(self, address: int, kind: Any, count: int) -> Any:
+        if kind is not ctypes.c_double:
+            return _view(address, kind, count)
+        return _view(address, kind, self._width * count).reshape(count, self._width)[:, 0]
 
 
 class AtHand(_Compiled):
@@ -189,9 +220,11 @@ class Program:
     def __init__(self, packed: Packed, code: Code, entries: Sequence[str] = ()) -> None:
         self.ints: Ints = packed.structure.copy()
         kernels = [kernel for kernel in packed.kernels.values() if isinstance(kernel, str)]
-        functions = tuple(dict.fromkeys((*entries, *packed.laws, *kernels, *packed.runs.values())))
+        # Searches side by side know nothing of derivatives.
+        runs = {} if isinstance(code, Tangents) else packed.runs
+        functions = tuple(dict.fromkeys((*entries, *packed.laws, *kernels, *runs.values())))
         self.code = code = code.chosen_for(functions)
-        runs = packed.runs if code is COMPILED else {}
+        runs = runs if code is COMPILED else {}
         self._equilibria, self._responses = packed.equilibria, packed.responses
         self.failures: list[Exception] = []
         self._kept: list[Any] = []

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
-from osimlite.simulation.elements.laws import law_function
+from osimlite.simulation.elements.laws import law_of
 from osimlite.simulation.engines.sources import digest_of
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def is_at_hand(name: str) -> bool:
         return True
     from osimlite.simulation.engines.object_code import load
 
-    result = load(name, digest_of(law_function(name)))
+    result = load(name, digest_of(law_of(name)[0]))
     if result is not None:
         _addresses[name] = result
     return result is not None

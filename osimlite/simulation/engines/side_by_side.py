@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from osimlite._cores import cores
 from osimlite.errors import OsimliteError
-from osimlite.simulation.elements.laws import law_function
+from osimlite.simulation.elements.laws import law_of
 from osimlite.simulation.engines.sources import digest_of, functions_within
 
 SHARE = 14_000
@@ -44,7 +44,7 @@ def shares(names: Sequence[str], cores: int) -> list[list[str]]:
 
 def size_of(name: str) -> int:
     """Python code (bytes) of a law: about as long it takes to compile."""
-    return sum(len(part.__code__.co_code) for part in functions_within(law_function(name)))
+    return sum(len(part.__code__.co_code) for part in functions_within(law_of(name)[0]))
 
 
 def compilers() -> int:
@@ -62,11 +62,11 @@ def made(name: str) -> Made:
     """
     from osimlite.simulation.engines.object_code import TESTED, numba_version, translated
 
-    function = law_function(name)
+    function, directions = law_of(name)
     try:
         from osimlite.simulation.engines.compiler import compiled
 
-        text, symbol = compiled(function)
+        text, symbol = compiled(function, directions)
     except (AttributeError, ImportError, NotImplementedError, TypeError) as error:
         message = f"numba {numba_version()} cannot compile osimlite's kernels ({error}); pip install 'numba{TESTED}'"
         raise OsimliteError(message) from error
@@ -96,7 +96,7 @@ class Helper:
         self._output.seek(0)
         for line in self._output.read().splitlines():
             name, digest, code, symbol = json.loads(line)
-            if digest == digest_of(law_function(name)):
+            if digest == digest_of(law_of(name)[0]):
                 yield Made(name, digest, base64.b64decode(code), symbol)
 
     def __enter__(self) -> Helper:

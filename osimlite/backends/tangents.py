@@ -1,0 +1,244 @@
+"""The rates of a model with their exact derivatives along directions, in machine code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+
+from osimlite._require import require
+from osimlite.backends.stated import StatedModel
+from osimlite.errors import UnsupportedError
+from osimlite.kernels import merson
+from osimlite.kernels.layout import MODEL, OUTCOME, STAGE, WORK
+from osimlite.kernels.method import ACCEPTED, ERRORS, LAST_TIME, NEXT_STEP, REACHED
+from osimlite.multibody.spatial import Array
+from osimlite.records import replace
+from osimlite.schema.model import Model, expect_model
+from osimlite.simulation.elements.controls import Controls
+from osimlite.simulation.engines.linking import Program, Tangents, has_compiler
+from osimlite.simulation.integrators import MERSON
+from osimlite.simulation.pack import Packed, pack
+
+DIRECTIONS = 16
+"""So many derivatives are carried at once."""
+
+
+def tangents(model: Model, parameters: Iterable[str] = (), folder: str | Path | None = None) -> TangentModel:
+    """The rates of a model with exact derivatives, by the machine code that simulates it.
+
+    Args:
+        model: what moves.
+        parameters: numbers of the model, by path, that the rates are functions of, as of :func:`osimlite.casadi`.
+        folder: where the model's file is, for the files that it names; the folder that the program runs in if None.
+
+    Raises:
+        MissingDependency: numba is not installed.
+        ModelError: the model is not a mechanism.
+        SettingError: there is no such number.
+        UnsupportedError: a force is computed in Python, or a number cannot be a parameter; the message names it.
+    """
+    expect_model(model)
+    return TangentModel(model, tuple(parameters), Path(folder or "."))
+
+
+class Machine:
+    """Machine code of a packed model, and the vectors that it works on: rows of numbers and their derivatives.
+
+    Args:
+        packed: the model.
+        entries: names of the kernels that are called.
+        room: for so many numbers more in the work vector.
+
+    Attributes:
+        program: the model with the addresses of its code.
+        x: the numbers.
+        w: the work vector.
+    """
+
+    def __init__(self, packed: Packed, entries: Sequence[str], room: int = 0) -> None:
+        # Nothing is projected.
+        laws = tuple(name for name in packed.laws if name != "project")
+        self.program = Program(replace(packed, laws=laws), _code(), entries)
+        self.x = np.zeros((len(packed.numbers), 1 + DIRECTIONS))
+        self.x[:, 0] = packed.numbers
+        self.w = np.zeros((int(packed.structure[MODEL.WORK_SIZE]) + room, 1 + DIRECTIONS))
+
+    def entry(self, name: str, y: Array, f: Array) -> Callable[[int], int]:
+        """A kernel that is called with the last of its arguments."""
+        return self.program.code.bound(name, self.program.ints, self.x, self.w, y, f)
+
+    def begin(self, t: float) -> None:
+        """Set the time, and forget what other directions have left."""
+        self.w[:, 1:] = 0.0
+        self.w[WORK.TIME, 0] = t
+
+
+class TangentModel(StatedModel):
+    """A model whose rates xdot = f(t, x, u, p) are found with derivatives along directions of x, u and p.
+
+    The controls u stand in the place of what the model's controllers say (to which a stretch reflex adds). Units are
+    those of OpenSim's files of states: m, rad, s, N. Where rates do not exist, all is not a number. Where a law bends,
+    or a path touches a surface, the derivative is that of the side that machine code takes there.
+
+    The arguments and attributes are those of :class:`osimlite.backends.stated.StatedModel`.
+    """
+
+    def __init__(self, model: Model, parameters: Sequence[str] = (), folder: Path = Path()) -> None:
+        if not has_compiler():
+            require("numba", extra="sim", purpose="derivatives in machine code")
+        super().__init__(model, parameters, folder)
+        packed = self._packed
+        for place, kernel in packed.kernels.items():
+            if place in packed.owners and not isinstance(kernel, str):
+                path = self.forces.elements[packed.owners[place]].path
+                raise UnsupportedError(
+                    f"'{path}' is computed in Python, which finds no derivatives; set its appliesForce to false"
+                )
+        slopes = self._parameters.slopes if self._parameters else {}
+        self._parametric, self._slopes = [*slopes], np.zeros((len(slopes), len(self.parameters)))
+        for row, parts in zip(self._slopes, slopes.values(), strict=True):
+            for number, factor in parts:
+                row[number] = factor
+        self._machine = machine = Machine(packed, ("evaluate",))
+        # The controls are given, whatever the controllers of the model say.
+        machine.program.ints[MODEL.CONTROLS] = 0
+        first = int(packed.structure[MODEL.WORK_CONTROL])
+        self._driven = machine.w[first : first + len(self.controls)]
+        self._y, self._f = (np.zeros((len(self.states), 1 + DIRECTIONS)) for _ in range(2))
+        self._evaluate = machine.entry("evaluate", self._y, self._f)
+
+    def take(self, p: Array) -> None:
+        """Have the parameters (p,) be these from now on."""
+        self.p = p
+        self.put(self._machine.x[:, 0])
+
+    def put(self, numbers: Array) -> None:
+        """Put what depends on the parameters into numbers (k,) of the model."""
+        if self._parameters:
+            numbers[self._parametric] = self._parameters.base[self._parametric] + self._slopes @ self.p
+
+    def put_along(self, dp: Array, numbers: Array) -> None:
+        """Likewise its derivatives (k, m) along directions of the parameters (p, m)."""
+        numbers[self._parametric] = self._slopes @ dp
+
+    def along(
+        self,
+        t: float,
+        x: Sequence[float] | Array,
+        u: Sequence[float] | Array,
+        dx: Array,
+        du: Array | None = None,
+        dp: Array | None = None,
+    ) -> tuple[Array, Array]:
+        """The rates (x,), and their derivatives (x, m) along m directions.
+
+        Args:
+            t: time, s.
+            x: state (x,).
+            u: controls (u,).
+            dx: directions of the state (x, m).
+            du: of the controls (u, m); 0 if left out.
+            dp: of the parameters (p, m); 0 if left out.
+        """
+        machine, y, f = self._machine, self._y, self._f
+        y[self._places, 0], self._driven[:, 0] = x, u
+        rates, result = np.full(len(x), np.nan), np.full(dx.shape, np.nan)
+        for part, own in batches(dx.shape[1]):
+            machine.begin(t)
+            y[self._places, own] = dx[:, part]
+            if du is not None:
+                self._driven[:, own] = du[:, part]
+            if dp is not None:
+                self.put_along(dp[:, part], machine.x[:, own])
+            if self._evaluate(STAGE.ACCELERATION) == OUTCOME.OK:
+                rates, result[:, part] = f[self._places, 0], f[self._places, own]
+        if dp is not None:
+            machine.x[:, 1:] = 0.0
+        return rates, result
+
+    def linear(self, t: float, x: Array, u: Array, p: Array | None = None) -> tuple[Array, Array, Array]:
+        """The rates (x,), and their derivatives by the state (x, x) and by the controls (x, u)."""
+        size = len(x)
+        both = np.eye(size + len(u))
+        if p is not None:
+            self.take(p)
+        rates, found = self.along(t, x, u, both[:size], both[size:])
+        return rates, found[:, :size], found[:, size:]
+
+    def steps(self, controls: Controls, dp: Array) -> Steps:
+        """What follows a motion that controls drive, along directions of the parameters (p, m) and of the start."""
+        packed = pack(self.mechanism, replace(self.forces, controls=controls), apart=self._apart)
+        return Steps(self, packed, self._places, dp)
+
+
+class Steps:
+    """Steps of Merson's method, with derivatives of where they lead by where they begin and by parameters.
+
+    They work on blocks (b, x, 1 + DIRECTIONS): for so many directions at once, in the packed order, states and their
+    derivatives.
+
+    Args:
+        model: whose motion.
+        packed: the same with the controls of the motion.
+        places: in the packed order of the states.
+        dp: how the parameters change along all directions (p, m).
+    """
+
+    def __init__(self, model: TangentModel, packed: Packed, places: Sequence[int], dp: Array) -> None:
+        size, self._dp, self._places, self._number = len(places), dp, places, -1
+        method, first = int(packed.structure[MODEL.WORK_SIZE]), int(packed.structure[MODEL.WORK_STATE])
+        self._machine = machine = Machine(packed, ("evaluate", MERSON), merson.HEAD + merson.STATES * size)
+        self._start, self._end = (np.zeros((2 * size, 1 + DIRECTIONS)) for _ in range(2))
+        self._errors, self._h = machine.w[first + ERRORS * size :][:size], machine.w[method:, 0]
+        self._evaluate = machine.entry("evaluate", self._start, self._start[size:])
+        self._step: Callable[[], int] = partial(machine.entry(MERSON, self._start, self._end), method)
+        model.put(machine.x[:, 0])
+        self._numbers = [machine.x.copy() for _ in batches(dp.shape[1])]
+        for (part, own), numbers in zip(batches(dp.shape[1]), self._numbers, strict=True):
+            model.put_along(dp[:, part], numbers[:, own])
+
+    def blocks(self, y: Array, slopes: Array) -> Array:
+        """Of a state (x,) with its derivatives (x, m), in the order of the model."""
+        result = np.zeros((len(self._numbers), len(y), 1 + DIRECTIONS))
+        result[:, self._places, 0] = y
+        for block, (part, own) in zip(result, batches(slopes.shape[1]), strict=True):
+            block[self._places, own] = slopes[:, part]
+        return result
+
+    def slopes(self, blocks: Array) -> Array:
+        """The derivatives (x, m) in blocks."""
+        parts = [block[self._places, own] for block, (_, own) in zip(blocks, batches(self._dp.shape[1]), strict=True)]
+        return np.hstack(parts)
+
+    def step(self, t0: float, t1: float, start: Array) -> tuple[Array, Array]:
+        """The blocks of the end of a step, and of the error there; what does not exist is not a number."""
+        end, error, machine, size = np.empty(start.shape), np.empty(start.shape), self._machine, start.shape[1]
+        for number, block in enumerate(start):
+            if self._number != number:
+                self._number, machine.x[:] = number, self._numbers[number]
+            machine.begin(t0)
+            h = self._h
+            h[REACHED], h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED] = t0, t1, t1 - t0, np.inf
+            self._start[:size] = block
+            self._end[0] = np.nan
+            if self._evaluate(STAGE.ACCELERATION) == OUTCOME.OK:
+                self._step()
+            end[number], error[number] = self._end[:size], self._errors
+        if machine.program.failures:
+            raise machine.program.failures.pop()
+        return end, error
+
+
+def batches(count: int) -> Iterator[tuple[slice, slice]]:
+    """Directions that are taken at once: which of so many, and their places behind a number."""
+    for first in range(0, max(count, 1), DIRECTIONS):
+        size = min(DIRECTIONS, max(count - first, 0))
+        yield slice(first, first + size), slice(1, 1 + size)
+
+
+@cache
+def _code() -> Tangents:
+    return Tangents(DIRECTIONS)
