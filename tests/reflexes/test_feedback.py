@@ -304,3 +304,17 @@ def test_sweeps_go_by_a_file(model, tmp_path) -> None:
     (tmp_path / "stiff.par").write_text("motor-elbow.KP 5 5 1\n")
     result = command(*words, "--par", tmp_path / "stiff.par")
     assert result.code != 0 and "settings" in result.err
+
+
+def test_kernels_as_python_go_likewise(model, monkeypatch) -> None:
+    """Where a place outside an array is an error."""
+    from tests.simulation.checked import Checked
+
+    feedback = noisy(base_noise=0.01, sensor_noise=0.01)
+    expected = osimlite.simulation.Simulation(model, "compiled").run(0.02, controller=feedback)
+    with monkeypatch.context() as patched:
+        patched.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
+        plain = osimlite.simulation.Simulation(model, "compiled").run(0.02, controller=feedback)
+    assert plain.states.rows == pytest.approx(expected.states.rows, rel=1e-12, abs=1e-12)
+    assert expected.controller is not None and plain.controller is not None
+    assert plain.controller.rows == pytest.approx(expected.controller.rows, rel=1e-9, abs=1e-12)
