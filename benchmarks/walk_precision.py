@@ -24,7 +24,7 @@ from osimlite.simulation.copies import Copies
 METHODS = {
     "euler2": (1e-2, 3e-3, 1e-3, 1e-4, 1e-5),
     "merson": (1e-1, 1e-2, 1e-3, 1e-4, 1e-6),
-    "rosenbrock": (1e-1, 1e-2, 6e-3, 3e-3, 1e-3, 1e-4),
+    "rosenbrock": (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 1e-4),
     "adams": (1e-2, 1e-3, 1e-4, 1e-6),
     "bdf": (1e-2, 1e-3, 1e-4),
 }

@@ -22,7 +22,7 @@ DEFAULT_ACCURACY = 1e-3
 LOOSE = 1e-2
 """The loosest accuracy that keeps motions near the model's own.
 
-The walker ends within 0.01 rad of it after a second, by every integrator; at 0.1 it is 0.13 rad off by Rosenbrock's
+The walker ends within 0.01 rad of it after a second, by every integrator; at 0.1 it is 0.05 rad off by Rosenbrock's
 method and 0.07 by Merson's.
 """
 """What OpenSim's Manager uses where no accuracy was set."""
