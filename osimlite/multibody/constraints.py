@@ -33,6 +33,11 @@ class Constraint(Protocol):
         """Indices of the bodies that it speaks of."""
 
     @property
+    def coordinates(self) -> tuple[int, ...]:
+        """Indices of the coordinates that it speaks of."""
+        return ()
+
+    @property
     def name(self) -> str:
         """What the constraint is called in messages."""
 
@@ -63,6 +68,11 @@ class Lock(Constraint):
     coordinate: int
     name: str = "lock"
 
+    @property
+    def coordinates(self) -> tuple[int, ...]:
+        """The one that is locked."""
+        return (self.coordinate,)
+
 
 @dataclass(frozen=True)
 class Prescribed(Constraint):
@@ -72,6 +82,11 @@ class Prescribed(Constraint):
     coordinate: int
     function: Function
     name: str = "prescribed coordinate"
+
+    @property
+    def coordinates(self) -> tuple[int, ...]:
+        """The one that is prescribed."""
+        return (self.coordinate,)
 
 
 @dataclass(frozen=True)
@@ -83,3 +98,8 @@ class Coupler(Constraint):
     independent: tuple[int, ...]
     function: Function
     name: str = "coupler"
+
+    @property
+    def coordinates(self) -> tuple[int, ...]:
+        """Those that others follow, and the one that follows."""
+        return (*self.independent, self.dependent)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,6 +52,10 @@ class Kinematics:
         # What follows from them is computed when it is asked for: nobody may change them until then.
         self.mechanism, self.q, self.u, self.time = mechanism, q.copy(), u.copy(), time
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Neither the vectors nor the program can be copied, but found again.
+        return Kinematics, (self.mechanism, self.q, self.u, self.time)
+
     @cached_property
     def program(self) -> Program:
         """The mechanism, packed."""
@@ -87,10 +91,11 @@ class Kinematics:
     def all_equations(self) -> Equations:
         """The equations of all constraints; of those that bind speeds only, the errors mean nothing."""
         program = self.program
-        if program.has_balls:
-            # Rates of coordinates must be defined.
-            self.mechanism.rate_matrix(self.q)
-        w, y, f = self.vectors if program.has_balls or program.on_bodies else self._unmoved
+        balls = [item for item in self.mechanism.turning if not program.bound.isdisjoint(item.coordinates)]
+        for ball in balls:
+            # The rates of its coordinates must be defined.
+            ball.rate_matrix(self.q[list(ball.coordinates)])
+        w, y, f = self.vectors if balls or program.on_bodies else self._unmoved
         if program.constraints:
             with numbers(w):
                 bind(program.s, program.x, w, y, f)

@@ -396,14 +396,14 @@ class Mechanism:
 
     def _station(self, frame: str, station: ArrayLike) -> tuple[int, Array]:
         body, placed = self.placement(frame)
-        point: Array = placed[:3, :3] @ np.asarray(station, dtype=float) + placed[:3, 3]
+        point: Array = placed[:3, :3] @ _vector(station, "station") + placed[:3, 3]
         return body, point
 
     def _applied(self, state: Kinematics, forces: Values, wrenches: Mapping[str, Wrench]) -> Array:
         total = self._array(forces, "force")
         for name, (force, torque) in wrenches.items():
             body, placed = self.placement(name)
-            load = np.concatenate((np.asarray(torque, dtype=float), np.asarray(force, dtype=float)))
+            load = np.concatenate((_vector(torque, "torque"), _vector(force, "force")))
             total = total + load @ state.point_jacobian(body, placed[:3, 3])
         return total
 
@@ -418,8 +418,19 @@ class Mechanism:
             return result
         result = np.asarray(values, dtype=float)
         if result.shape != (count,):
-            given = " × ".join(str(size) for size in result.shape) or "a single one"
             raise ModelError(
-                f"'{self.name}' takes one {what} for each of its {count} coordinates, in their order; got {given}"
+                f"'{self.name}' takes one {what} for each of its {count} coordinates, in their order; "
+                f"got {_sizes(result)}"
             )
         return result
+
+
+def _vector(values: ArrayLike, what: str) -> Array:
+    result = np.asarray(values, dtype=float)
+    if result.shape != (3,):
+        raise ModelError(f"a {what} has 3 numbers; got {_sizes(result)}")
+    return result
+
+
+def _sizes(values: Array) -> str:
+    return " × ".join(str(size) for size in values.shape) or "a single one"

@@ -42,7 +42,7 @@ class Program:
         links: link of each body, and of ground as the last (b + 1,); -1 for ground.
         frames: each body in its link (b + 1, 4, 4).
         constraints: number of each constraint, by its identity.
-        has_balls: whether some speeds are not the rates of coordinates.
+        bound: the coordinates that constraints speak of.
         on_bodies: whether a constraint speaks of bodies.
     """
 
@@ -58,9 +58,10 @@ class Program:
         self.x, self.heavy = floats(packer.numbers), floats(packer.numbers)
         for k in range(GRAVITY_AT, GRAVITY_AT + 3):
             self.x[k] = 0.0
-        self.order, self.has_balls = list(order), bool(packer.balls)
+        self.order = list(order)
         self.freedoms = np.argsort(order)
         self.constraints = {id(item): number for number, item in enumerate(constraints)}
+        self.bound = frozenset(place for item in constraints for place in item.coordinates)
         self.on_bodies = any(item.bodies for item in constraints)
         placements = [*tree.places.placements, tree.places.placement(GROUND)]
         self.links = np.array([item.link for item in placements])

@@ -133,5 +133,5 @@ def _mobilities(mechanism: Mechanism, constraint: Constraint) -> list[int]:
     """Places of all coordinates of the joints that a coupler speaks of, its dependent coordinate last."""
     assert isinstance(constraint, Coupler)
     owners = {place: body.mobilizer.coordinates for body in mechanism.bodies for place in body.mobilizer.coordinates}
-    joints = dict.fromkeys(owners[place] for place in (*constraint.independent, constraint.dependent))
+    joints = dict.fromkeys(owners[place] for place in constraint.coordinates)
     return [place for joint in joints for place in joint]

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import copy
 import dataclasses
 import pickle
 
@@ -61,6 +62,13 @@ def test_two_coordinates_with_one_name_are_told_apart_by_their_paths():
             "no body or frame '/bodyset/w'; did you mean '/bodyset/W",
         ),
         (lambda tree: tree.acceleration({}, {}, body_wrenches={"Q": Wrench((0, 0, 0), (0, 0, 0))}), "frame 'Q'"),
+        (lambda tree: tree.jacobian("W", {}, (0.0, 1.0)), "a station has 3 numbers; got 2"),
+        (lambda tree: tree.station_position("W", 0.0, {}), "a station has 3 numbers; got a single one"),
+        (lambda tree: tree.generalized_forces({}, {"W": ((1, 2), (0, 0, 0))}), "a force has 3 numbers; got 2"),
+        (
+            lambda tree: tree.generalized_forces({}, {"W": ((0, 0, 0), [[1, 2, 3]])}),
+            "a torque has 3 numbers; got 1 × 3",
+        ),
     ],
 )
 def test_what_is_not_there_is_named(call, words):
@@ -140,6 +148,10 @@ def test_a_mechanism_is_the_same_in_another_process():
     mechanism = mixed_tree()
     matrix = mechanism.mass_matrix({})
     assert np.array_equal(pickle.loads(pickle.dumps(mechanism)).mass_matrix({}), matrix)
+    state = mechanism.at({}, {})
+    origins = state.origins
+    for other in (pickle.loads(pickle.dumps(state)), copy.deepcopy(state)):
+        assert np.array_equal(other.origins, origins)
 
 
 def test_a_state_stays_as_it_was_asked_for():

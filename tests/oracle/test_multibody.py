@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.errors import SimulationError
 from osimlite.multibody import Mechanism, build_mechanism
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.functions import Constant, LinearFunction
@@ -140,6 +142,31 @@ def test_locked_coordinates_of_a_ball_joint(places: tuple[int, ...], tmp_path: P
     assert q == pytest.approx([item.getValue(state) for item in coordinates], abs=1e-15)
     assert u == pytest.approx([item.getSpeedValue(state) for item in coordinates], abs=1e-12)
     _same_motion(model, state, mechanism)
+
+
+@pytest.mark.parametrize("lock", [False, True])
+def test_a_ball_speeds_up_where_its_angles_have_no_rates(lock: bool, tmp_path: Path) -> None:
+    rng = np.random.default_rng(11)
+    model = _model()
+    inner, outer = _body(model, "inner", rng), _body(model, "outer", rng)
+    _join(model, "BallJoint", "j1", model.getGround(), inner, rng)
+    _join(model, "PinJoint", "j2", inner, outer, rng)
+    model.finalizeConnections()
+    model.getCoordinateSet().get(3).set_locked(lock)
+    mechanism = _built(model, tmp_path)
+    state = model.initSystem()
+    for index, value in enumerate((0.3, np.pi / 2, 0.2)):
+        coordinate = model.getCoordinateSet().get(index)
+        coordinate.setValue(state, value, False)
+        coordinate.setSpeedValue(state, 0.5 + index)
+    _same_motion(model, state, mechanism)
+    turns = [0.3, np.pi / 2, 0.2, 0.0], [0.5, 1.5, 2.5, 0.0]
+    assert mechanism.project_speeds(*turns) == pytest.approx(turns[1], abs=1e-15)
+    locked = replace(
+        mechanism, coordinates=(replace(mechanism.coordinates[0], locked=True), *mechanism.coordinates[1:])
+    )
+    with pytest.raises(SimulationError, match="their rates are not defined"):
+        locked.acceleration(*turns)
 
 
 @pytest.mark.parametrize(
