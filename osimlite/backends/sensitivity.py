@@ -17,7 +17,7 @@ import numpy as np
 
 from osimlite.backends.parameters import number_of
 from osimlite.backends.stated import StatedModel
-from osimlite.backends.tangents import TangentModel, tangents
+from osimlite.backends.tangents import Steps, TangentModel, tangents
 from osimlite.errors import SettingError, SimulationError, UnsupportedError
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
@@ -183,41 +183,13 @@ class _Followed:
         times, states, ended = self._simulation.every_step(0.0, start, wanted[-1], Settings(accuracy))
         if ended is not None:
             raise ended
-        count, initial = len(self._made.parameters), self._initial
-        result, row = np.zeros((len(wanted), len(self._places), count + len(initial))), 1
-        result[0, initial, range(count, count + len(initial))] = 1.0
-        rows = np.array(states)[:, self._places]
-        y = self._steps.blocks(rows[0], result[0])
-        # The steps are those of the motion, each from where that was.
-        values = [self._steps.blocks(state, result[0])[0, :, 0] for state in rows]
         for place in (0, len(times) // 2, -1):
             self._require_same(times[place], states[place])
-        for (t, state), (end, _) in pairwise(zip(times, values, strict=True)):
-            y[:, :, 0] = state
-            while row < len(wanted) and wanted[row] <= end:
-                y, t = self._stepped(t, wanted[row], y, accuracy), wanted[row]
-                result[row], row = self._steps.slopes(y), row + 1
-            if t < end:
-                y = self._stepped(t, end, y, accuracy)
-        return result
-
-    def _stepped(self, t0: float, t1: float, y0: Array, accuracy: float) -> Array:
-        """The blocks at the end of a step, in as many parts as the accuracy of the derivatives needs."""
-        h = t1 - t0
-        y, error = self._steps.step(t0, t1, y0)
-        size = np.abs(y)
-        if not np.isfinite(size.sum()):
-            worst = self._made.states[int(np.nonzero(~np.isfinite(self._steps.slopes(y)).all(axis=1))[0][0])]
-            raise SimulationError(f"between {t0:g} and {t1:g} s the derivatives of '{worst}' are no finite numbers")
-        # As the integrator weighs states; of each number, what counts is its largest derivative.
-        before = np.abs(y0)
-        weights = 1.0 / np.maximum(1.0, before[:, :, :1])
-        sizes = (np.maximum(before, size) * weights).max(axis=1)
-        errors = (np.abs(error) * weights).max(axis=1)
-        if h > SHORTEST and (errors > LOOSER * accuracy * sizes)[:, 1:].any():
-            middle = t0 + h / 2.0
-            return self._stepped(middle, t1, self._stepped(t0, middle, y0, accuracy), accuracy)
-        return y
+        count, initial = len(self._made.parameters), self._initial
+        slopes = np.zeros((len(self._places), count + len(initial)))
+        slopes[initial, range(count, count + len(initial))] = 1.0
+        rows = np.array(states)[:, self._places]
+        return followed(self._steps, times, rows, slopes, wanted, accuracy, self._made.states)
 
     def _require_same(self, t: float, y: Sequence[float]) -> None:
         """SettingError where the tangents say another derivative of the state than the motion has."""
@@ -231,6 +203,63 @@ class _Followed:
                 f"at {t:g} s the tangents say another derivative of '{worst}' than the motion has; make them of this "
                 "very model"
             )
+
+
+def followed(
+    steps: Steps,
+    times: Sequence[float],
+    states: Array,
+    slopes: Array,
+    wanted: Sequence[float],
+    accuracy: float,
+    names: Sequence[str],
+) -> Array:
+    """The derivatives (n, x, m) of a motion along m directions at some of its times.
+
+    Args:
+        steps: of the model, with the numbers and the directions that are meant.
+        times: of the ends of all steps, s.
+        states: there (s, x).
+        slopes: of the start along the directions (x, m).
+        wanted: the times (n,), from the start on, s.
+        accuracy: of the motion.
+        names: of the states, for messages.
+
+    Raises:
+        SimulationError: a derivative is no finite number.
+    """
+
+    def stepped(t0: float, t1: float, y0: Array) -> Array:
+        """The blocks at the end of a step, in as many parts as the accuracy of the derivatives needs."""
+        h = t1 - t0
+        y, error = steps.step(t0, t1, y0)
+        size = np.abs(y)
+        if not np.isfinite(size.sum()):
+            worst = names[int(np.nonzero(~np.isfinite(steps.slopes(y)).all(axis=1))[0][0])]
+            raise SimulationError(f"between {t0:g} and {t1:g} s the derivatives of '{worst}' are no finite numbers")
+        # As the integrator weighs states; of each number, what counts is its largest derivative.
+        before = np.abs(y0)
+        weights = 1.0 / np.maximum(1.0, before[:, :, :1])
+        sizes = (np.maximum(before, size) * weights).max(axis=1)
+        errors = (np.abs(error) * weights).max(axis=1)
+        if h > SHORTEST and (errors > LOOSER * accuracy * sizes)[:, 1:].any():
+            middle = t0 + h / 2.0
+            return stepped(middle, t1, stepped(t0, middle, y0))
+        return y
+
+    result, row = np.empty((len(wanted), *slopes.shape)), 1
+    result[0] = slopes
+    y = steps.blocks(states[0], slopes)
+    # The steps are those of the motion, each from where that was.
+    values = [steps.blocks(state, slopes)[0, :, 0] for state in states]
+    for (t, state), (end, _) in pairwise(zip(times, values, strict=True)):
+        y[:, :, 0] = state
+        while row < len(wanted) and wanted[row] <= end:
+            y, t = stepped(t, wanted[row], y), wanted[row]
+            result[row], row = steps.slopes(y), row + 1
+        if t < end:
+            y = stepped(t, end, y)
+    return result
 
 
 def _require_held(model: Model, made: TangentModel, name: str) -> None:

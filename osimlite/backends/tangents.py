@@ -171,34 +171,40 @@ class TangentModel(StatedModel):
     def steps(self, controls: Controls, dp: Array) -> Steps:
         """What follows a motion that controls drive, along directions of the parameters (p, m) and of the start."""
         packed = pack(self.mechanism, replace(self.forces, controls=controls), apart=self._apart)
-        return Steps(self, packed, self._places, dp)
+        result, numbers = Steps(packed, self._places), packed.numbers.copy()
+        changes = np.zeros((len(numbers), dp.shape[1]))
+        self.put(numbers)
+        self.put_along(dp, changes)
+        result.take(numbers, changes)
+        return result
 
 
 class Steps:
-    """Steps of Merson's method, with derivatives of where they lead by where they begin and by parameters.
+    """Steps of Merson's method, with derivatives of where they lead by where they begin and by numbers of the model.
 
     They work on blocks (b, x, 1 + DIRECTIONS): for so many directions at once, in the packed order, states and their
     derivatives.
 
     Args:
-        model: whose motion.
-        packed: the same with the controls of the motion.
+        packed: the model with the controls of the motion.
         places: in the packed order of the states.
-        dp: how the parameters change along all directions (p, m).
     """
 
-    def __init__(self, model: TangentModel, packed: Packed, places: Sequence[int], dp: Array) -> None:
-        size, self._dp, self._places, self._number = len(places), dp, places, -1
+    def __init__(self, packed: Packed, places: Sequence[int]) -> None:
+        size, self._places = len(places), places
         method, first = int(packed.structure[MODEL.WORK_SIZE]), int(packed.structure[MODEL.WORK_STATE])
         self._machine = machine = Machine(packed, ("evaluate", MERSON), merson.HEAD + merson.STATES * size)
         self._start, self._end = (np.zeros((2 * size, 1 + DIRECTIONS)) for _ in range(2))
         self._errors, self._h = machine.w[first + ERRORS * size :][:size], machine.w[method:, 0]
         self._evaluate = machine.entry("evaluate", self._start, self._start[size:])
         self._step: Callable[[], int] = partial(machine.entry(MERSON, self._start, self._end), method)
-        model.put(machine.x[:, 0])
-        self._numbers = [machine.x.copy() for _ in batches(dp.shape[1])]
-        for (part, own), numbers in zip(batches(dp.shape[1]), self._numbers, strict=True):
-            model.put_along(dp[:, part], numbers[:, own])
+
+    def take(self, numbers: Array, changes: Array) -> None:
+        """Have the numbers of the model (k,) be these from now on, and change so along all directions (k, m)."""
+        self._count, self._number = changes.shape[1], -1
+        self._numbers = [np.zeros(self._machine.x.shape) for _ in batches(self._count)]
+        for (part, own), block in zip(batches(self._count), self._numbers, strict=True):
+            block[:, 0], block[:, own] = numbers, changes[:, part]
 
     def blocks(self, y: Array, slopes: Array) -> Array:
         """Of a state (x,) with its derivatives (x, m), in the order of the model."""
@@ -210,7 +216,7 @@ class Steps:
 
     def slopes(self, blocks: Array) -> Array:
         """The derivatives (x, m) in blocks."""
-        parts = [block[self._places, own] for block, (_, own) in zip(blocks, batches(self._dp.shape[1]), strict=True)]
+        parts = [block[self._places, own] for block, (_, own) in zip(blocks, batches(self._count), strict=True)]
         return np.hstack(parts)
 
     def step(self, t0: float, t1: float, start: Array) -> tuple[Array, Array]:

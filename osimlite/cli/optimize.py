@@ -29,7 +29,11 @@ def optimize(
     vary: sweeping.Vary = None,
     budget: Annotated[int, Option(metavar="N", help="How many runs are allowed.")] = 1000,
     method: Annotated[
-        str, Option(help="cma, sobol-cma (for a few hundred runs), differential-evolution or nelder-mead.")
+        str,
+        Option(
+            help="cma, sobol-cma (for a few hundred runs), differential-evolution, nelder-mead or gradient (exact "
+            "derivatives of the motion: for many variables, and smooth objectives)."
+        ),
     ] = "cma",
     popsize: Annotated[
         int | None, Option(metavar="N", help="Runs between two decisions.", show_default="what suits the method")

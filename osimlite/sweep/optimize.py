@@ -24,7 +24,7 @@ from osimlite.sweep.pools import Pool, pool
 from osimlite.sweep.results import KEY, Partial, ResultTable, damage_told, partial_of, refuse_overwrite, schema, spare
 from osimlite.sweep.run import interrupted
 from osimlite.sweep.runner import FAILED, Block
-from osimlite.sweep.search import BudgetExhausted, Search, method_named
+from osimlite.sweep.search import BudgetExhausted, Search, gradient, method_named
 from osimlite.sweep.variables import Floats, refuse_counts
 from osimlite.sweep.variants import Variants
 from osimlite.text import counted
@@ -160,7 +160,9 @@ def optimize(
         evaluations.partial, ended = partial, ""
         try:
             with suppress(BudgetExhausted):
-                ended = look(evaluations.ask, Search(point, sigma, popsize, seed, is_bounded, budget, tolerance))
+                slopes = evaluations.slopes(registry.gradients(plan)) if look is gradient else None
+                search = Search(point, sigma, popsize, seed, is_bounded, budget, tolerance, slopes)
+                ended = look(evaluations.ask, search)
             partial.finish()
         except KeyboardInterrupt:
             raise interrupted(partial, counted(partial.rows, "run")) from None
@@ -279,10 +281,7 @@ class _Evaluations:
         wanted, points = len(points), points[: self.budget - self.count]
         if len(points) == 0:
             raise BudgetExhausted
-        values = np.tile([item.low for item in self.plan.variables], (len(points), 1))
-        for column, place in enumerate(self.free):
-            item = self.plan.variables[place]
-            values[:, place] = (item.at if self.is_bounded else item.beyond)(points[:, column])
+        values = self._values(points)
         known = self._history[self.count : self.count + len(points)]
         if any(row != list(new) for (row, _, _), new in zip(known, values.tolist(), strict=False)):
             raise SettingError(
@@ -304,6 +303,29 @@ class _Evaluations:
         if len(points) < wanted:
             raise BudgetExhausted
         return np.array(costs)
+
+    def slopes(self, gradients: Any) -> Callable[[Floats], Floats]:
+        """The derivatives of the cost by points (d,) of the cube.
+
+        Args:
+            gradients: what finds those of the objective, see :func:`osimlite.sweep.registry.gradients`.
+        """
+
+        def at(point: Floats) -> Floats:
+            (values,) = self._values(point[None])
+            stretched = [self.plan.variables[place].stretch(values[place]) for place in self.free]
+            found: Floats = gradients.at(values.tolist(), self.free)
+            return self.sign * found * stretched
+
+        return at
+
+    def _values(self, points: Floats) -> Floats:
+        """Values of all variables (k, v) at points (k, d) of the cube of the free ones."""
+        values = np.tile([item.low for item in self.plan.variables], (len(points), 1))
+        for column, place in enumerate(self.free):
+            item = self.plan.variables[place]
+            values[:, place] = (item.at if self.is_bounded else item.beyond)(points[:, column])
+        return values
 
     def _cost(self, status: str, value: float) -> float:
         """Of a run; what fails is worse than anything before."""

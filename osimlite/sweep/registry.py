@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 if TYPE_CHECKING:
     from osimlite.sweep.measures import Measure
+    from osimlite.sweep.plan import Plan
     from osimlite.sweep.variables import Floats
 
     Place = Callable[[Floats, Floats | None, Callable[[Floats], Floats]], Floats]
@@ -23,6 +24,10 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 PROVIDERS = ("osimlite.sweep.measures", "osimlite.gait.measures")
 """Modules that register something; one is loaded when those before it have nothing of a name."""
+
+
+GRADIENTS = "osimlite.backends.gradients"
+"""Module that finds derivatives of measures, by its class `Gradients`; it is loaded when a search asks for them."""
 
 
 class Known(NamedTuple):
@@ -55,6 +60,11 @@ def start(make: F) -> F:
 def measure_named(name: str) -> Known | None:
     """The measure of a name; None if nobody has one."""
     return _found(_MEASURES, name) if name.isidentifier() else None
+
+
+def gradients(plan: Plan) -> Any:
+    """What finds the derivatives of the first measure of a plan: ``at(values, free)``."""
+    return import_module(GRADIENTS).Gradients(plan)
 
 
 def start_named(name: str) -> Callable[[Any, Sequence[str] | None], Place]:

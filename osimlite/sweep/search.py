@@ -35,6 +35,7 @@ class Search(NamedTuple):
     is_bounded: bool  # whether points stay within the cube
     budget: int  # evaluations that are allowed
     tolerance: float | None = None  # of cost and points, at which the search ends; None for that of the method
+    slopes: Callable[[Floats], Floats] | None = None  # derivatives (d,) of the cost at a point, if it has any
 
 
 def cma(ask: Ask, search: Search, *, keeps_best: bool = False) -> str:
@@ -122,11 +123,30 @@ def nelder_mead(ask: Ask, search: Search) -> str:
     return f"converged: {result.message}"
 
 
+def gradient(ask: Ask, search: Search) -> str:
+    """Limited-memory quasi-Newton steps within bounds (scipy's L-BFGS-B) by exact derivatives; why it ended.
+
+    One run at a time; to where nothing near is better, which may be far from the best.
+    """
+    optimize = require("scipy.optimize", extra="sweep", purpose="the search by gradients")
+    tolerance = 1e-9 if search.tolerance is None else search.tolerance
+    result = optimize.minimize(
+        lambda point: float(ask(point[None])[0]),
+        search.start,
+        jac=search.slopes,
+        method="L-BFGS-B",
+        bounds=[(0.0, 1.0)] * len(search.start) if search.is_bounded else None,
+        options={"ftol": tolerance, "gtol": tolerance, "maxfun": 10**9, "maxiter": 10**9},
+    )
+    return f"converged: {result.message}"
+
+
 METHODS: dict[str, Callable[[Ask, Search], str]] = {
     "sobol-cma": sobol_cma,
     "cma": cma,
     "differential-evolution": differential_evolution,
     "nelder-mead": nelder_mead,
+    "gradient": gradient,
 }
 
 

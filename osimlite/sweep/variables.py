@@ -117,6 +117,10 @@ class Variable:
             return (math.log(value) - math.log(self.low)) / (math.log(self.high) - math.log(self.low))
         return (value - self.low) / (self.high - self.low)
 
+    def stretch(self, value: float) -> float:
+        """The derivative of a value by its fraction."""
+        return value * math.log(self.high / self.low) if self.is_log else self.high - self.low
+
     @property
     def is_fixed(self) -> bool:
         """Whether it has one value only."""
