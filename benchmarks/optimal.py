@@ -8,7 +8,8 @@ FOLDER: sources of opensim-core, or its git directory (``git clone --bare``), fo
 Seconds are those of the processor, medians of the rounds. *Set-up and solve* begins with the files, in a process that
 has loaded its libraries and solved another small study; the *process* is a whole one from its start, which solves one.
 Moco uses one thread (``OPENSIM_MOCO_PARALLEL=0``), as we do: more make its processor time larger. The violation is what
-Moco says of each solution file: its own largest constraint violation where it is the guess, before the first step.
+Moco says of each solution file, but of those of MocoInverse: its own largest constraint violation where it is the
+guess, before the first step.
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ import tempfile
 from pathlib import Path
 from statistics import median
 
+import osimlite
 from _moco_studies import CORE, STUDIES, kept
+from osimlite.moco import MocoTrajectory
+from osimlite.records import replace
 
 OURS = """
 import json, os, sys, time
@@ -122,8 +126,6 @@ def _say_more(folder: Path) -> None:
     """What SWIG does not show of a phase: names of goals, bounds of states."""
     if not (folder / "more.omoco").exists():
         return
-    import osimlite
-
     phase = osimlite.read_document(folder / "more.omoco").problem.phases
     said = {
         "goals": [goal.name for goal in phase.goals],
@@ -142,6 +144,8 @@ def _study(name: str, folder: Path, warm: str, rounds: int) -> None:
     for _ in range(rounds):
         for side, (code, choice) in sides.items():
             said[side], _ = _run(code, [choice, warm], folder)
+            # The table comes late.
+            print(f"{name}, {side}: {said[side]}", file=sys.stderr)
             spent[side].append(said[side][3])
             if side == "Moco":
                 # A second one would take minutes; its libraries are loaded before it begins.
@@ -178,10 +182,16 @@ def _run(code: str, arguments: list[str], folder: Path) -> tuple[list[float], st
 
 def _violation(folder: Path, solution: str) -> str:
     """The largest one that Moco has of a solution file."""
+    if (folder / "inverse.xml").exists():
+        # There Moco has the forces of constraints among its variables, which are none here.
+        return "-"
+    # Of a guess Moco takes the columns as they come, whatever their names.
+    own, theirs = (MocoTrajectory.read(folder / name) for name in (solution, "theirs.sto"))
+    replace(own, names=theirs.names).write(folder / solution)
     _, log = _run(THEIRS, [solution, ""], folder)
     (folder / "ipopt.opt").unlink()
-    found = re.search(r"Constraint violation\.+:\s+\S+\s+(\S+)", log)
-    return f"{float(found[1]):.1e}" if found else "?"
+    said = re.search(r"Constraint violation\.+:\s+\S+\s+(\S+)", log)
+    return f"{float(said[1]):.1e}" if said else "?"
 
 
 if __name__ == "__main__":
