@@ -64,14 +64,12 @@ class Reflexes:
         parts = [(kind, node)]
         if kind == COMPOSITE:
             parts = [*node.all_of(*CONTROLLERS[:-1]), *node.all_of(NOISE)]
-            node.get("name")
             node.expect_all_asked(f"a {COMPOSITE}", (*CONTROLLERS[:-1], NOISE))
         for name, part in parts:
             if name == NOISE:
                 self._read_noise(part)
             elif name == "ReflexController":
                 self.symmetric, self._is_sided = part.flag("symmetric", False), part.flag("dual_sided", True)
-                part.get("name")
                 for leg in (0, 1) if self._is_sided else (0,):
                     self._add_reflexes(part, parameters, "", leg, (1 << len(STATES)) - 1)
             elif self._has_states:
@@ -89,7 +87,6 @@ class Reflexes:
         noise[:, 0] = node.number("random_seed", 123)
         for place, key in enumerate(("base_noise", "proportional_noise", "sensor_noise", "proportional_sensor_noise")):
             noise[:, 1 + place] = node.number(key, 0.0)
-        node.get("name")
         node.expect_all_asked(f"a {NOISE}")
         if node.file.endswith(".scone"):
             tell("noise is as large as SCONE's, but not the same: its numbers depend on the compiler of SCONE")
@@ -97,8 +94,6 @@ class Reflexes:
     def _read_states(self, node: Node, parameters: Parameters) -> None:
         parameters.auto = node.number("auto_std_factor", parameters.auto)
         self.symmetric = node.flag("symmetric", True)
-        for key in ("signature_postfix", "name"):
-            node.get(key)
         for key in ("use_model_com_reference_pos", "omnidirectional"):
             if node.flag(key, False):
                 raise node.error(f"{key} is not done here")

@@ -102,7 +102,6 @@ class Measure(ABC):
         self.start, self.stop = node.number("start_time", 0.0), node.number("stop_time", 0.0) or inf
         if above is not None:
             self.start, self.stop = max(self.start, above.start), min(self.stop, above.stop)
-        node.get("signature"), node.get("signature_postfix")
         if not node.flag("minimize", True):
             raise node.error("measures that are to be large are not done here")
         self.report: dict[str, Array] = {}

@@ -29,9 +29,6 @@ INTEGRATORS = {"SemiExplicitEuler2": "euler2", "RungeKuttaMerson": "merson", "Ro
 POPULATION, GENERATIONS = 16, 1000
 """Of a search whose scenario says nothing."""
 LEFT_ASIDE = (
-    "signature_prefix",
-    "signature_postfix",
-    "name",
     "output_root",
     "min_progress",
     "window_size",
@@ -130,7 +127,7 @@ class Scenario:
         for key in ("initial_load_dof", "state_init_file", "integration_method", "integration_accuracy", "initial_load",
                     "initial_state_offset", "initial_state_offset_exclude", "initial_state_offset_include",
                     "initial_state_offset_symmetric", "leg_upper_body", "leg_lower_body", "leg_contact_force",
-                    "initial_equilibration_activation", "name", "max_integration_step_size"):  # fmt: skip
+                    "initial_equilibration_activation", "max_integration_step_size"):  # fmt: skip
             settings.get(key)
         settings.expect_all_asked("a ModelOpenSim4")
         controller, measure = (next(iter(objective.all_of(*names)), None) for names in (CONTROLLERS, MEASURES))
@@ -140,8 +137,6 @@ class Scenario:
         if measure is None:
             raise objective.error(f"a measure is needed: {listed(list(MEASURES))}")
         self.controller, self.measure = controller, measure
-        for key in ("name", "signature_prefix"):
-            objective.get(key)
         objective.expect_all_asked("a SimulationObjective", tuple(MEASURES))
         method = settings.text("integration_method", "SemiExplicitEuler2")
         if method not in INTEGRATORS:

@@ -21,6 +21,10 @@ _MOST_DEEP = 20
 """Files that may include one another."""
 
 
+CALLED = "name", "signature", "signature_prefix", "signature_postfix"
+"""How any part is called, and the folder of its results in SCONE; nothing else depends on these."""
+
+
 @dataclass
 class Node:
     """A value, and what stands below it.
@@ -105,7 +109,7 @@ class Node:
             DocumentError: there is one; it names the nearest that is known.
         """
         for name, node in self.parts:
-            if name not in self.asked:
+            if name not in self.asked and name not in CALLED:
                 near = did_you_mean(name, {*self.asked, *known})
                 raise node.error(f"'{name}' of {what} is not done here{near}")
 

@@ -101,3 +101,14 @@ def test_files_of_parameters(tmp_path) -> None:
     (tmp_path / "a.par").write_text("S1.x 1 2\n")
     with pytest.raises(OsimliteError, match="a name, best, mean and standard deviation"):
         read_par(tmp_path / "a.par")
+
+
+def test_what_parts_are_called_is_nobody_s_business(tmp_path) -> None:
+    (tmp_path / "it.scone").write_text(
+        "signature_postfix = OS4 name = that signature = it signature_prefix = DATE_TIME x = 1"
+    )
+    top = read_settings(tmp_path / "it.scone")
+    with pytest.raises(OsimliteError, match="'x' of a model is not done here"):
+        top.expect_all_asked("a model")
+    top.get("x")
+    top.expect_all_asked("a model")
