@@ -28,6 +28,8 @@ KINDS = "MuscleReflex", "ConditionalMuscleReflex", "DofReflex"
 """Of reflexes."""
 NEVER = -1.0
 """A threshold that has no effect."""
+LARGEST_SEED = 10**15
+"""Seeds below are exact as numbers of a file, and in 64 bits."""
 
 
 class Part(NamedTuple):
@@ -84,9 +86,13 @@ class Reflexes:
         if self._is_noisy:
             raise node.error(f"there is a {NOISE} already")
         self._is_noisy, noise = True, self._limits[:, LIMITS.SEED :]
-        noise[:, 0] = node.number("random_seed", 123)
+        noise[:, 0] = seed = node.number("random_seed", 123.0)
+        if not (seed.is_integer() and abs(seed) < LARGEST_SEED):
+            raise node.error(f"'random_seed' must be a whole number of up to 15 digits, not {seed:g}")
         for place, key in enumerate(("base_noise", "proportional_noise", "sensor_noise", "proportional_sensor_noise")):
-            noise[:, 1 + place] = node.number(key, 0.0)
+            noise[:, 1 + place] = width = node.number(key, 0.0)
+            if width < 0.0:
+                raise node.error(f"'{key}' must not be negative, and is {width:g}")
         node.expect_all_asked(f"a {NOISE}")
         if node.file.endswith(".scone"):
             tell("noise is as large as SCONE's, but not the same: its numbers depend on the compiler of SCONE")

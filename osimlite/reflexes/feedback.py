@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import SettingError
-from osimlite.kernels.reflexes import TERM
+from osimlite.kernels.reflexes import LIMITS, TERM
 from osimlite.kernels.senses import SENSED
 from osimlite.reflexes.controllers import CONTROLLERS, Reflexes
 from osimlite.reflexes.parameters import Parameters, read_par
@@ -87,8 +87,10 @@ class Feedback:
             if name not in parameters.found and name not in self._begun:
                 raise SettingError(f"the controller has no parameter '{name}'{or_known(name, parameters.found)}")
         plan, numbers = reflexes.compiled()
-        # What no reflex names is left to others.
-        others = np.setdiff1d(np.arange(len(felt.names)), [term.ints[TERM.TARGET] for term in reflexes.terms])
+        # What no reflex names, and no noise, is left to others.
+        everything, is_noisy = np.arange(len(felt.names)), numbers[0, LIMITS.CONTROL_NOISE] > 0.0
+        targets = [term.ints[TERM.TARGET] for term in reflexes.terms]
+        others = np.setdiff1d(everything, everything if is_noisy else targets)
         first, known = SENSED.HEAD + 2 * len(felt.muscles), felt.known.copy()
         known[first + others] = known[first + len(felt.names) + others] = 0.0
         return Held(tuple(felt.paths), self.step, tuple(felt.sensors()), felt.senses, known, plan, numbers)

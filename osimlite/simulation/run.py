@@ -212,6 +212,9 @@ class Simulation:
         if chosen.controller is not None:
             if fixed_step is not None:
                 raise SettingError("a controller needs the steps of an integrator; leave out the fixed step")
+            if isinstance(chosen.controller, str | Path | Mapping):
+                such = f"osimlite.Feedback({chosen.controller!r})"
+                raise SettingError(f"a controller is an osimlite.Feedback, such as {such}")
             held = chosen.controller.held(self.model, self.engine)
             to = held.nearest(to)
             if chosen.resume is not None:

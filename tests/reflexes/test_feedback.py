@@ -157,6 +157,7 @@ def test_what_has_no_meaning_is_refused(model, tmp_path) -> None:
         ("so had no controller", {"resume": plain, "controller": feedback}),
         (r"has left no controller\.sto", {"resume": tmp_path / "first", "controller": feedback}),
         ("say no other start", {"resume": first, "controller": feedback, "initial": {"elbow": 1.0}}),
+        (r"controller is an osimlite\.Feedback, such as osimlite\.Feedback\('a.yaml'\)", {"controller": "a.yaml"}),
         ("leave out the fixed step", {"controller": feedback, "fixed_step": 0.001}),
         ("not functions of Python", {"controller": feedback, "controls": {"motor": lambda t: t}}),
     ):
@@ -177,6 +178,9 @@ def test_what_has_no_meaning_is_refused(model, tmp_path) -> None:
         ({"CompositeController": {"NoiseControler": {}}}, "'NoiseControler'.*did you mean 'NoiseController'"),
         ({"CompositeController": {"NoiseController": [{}, {}]}}, "a NoiseController already"),
         ({"CompositeController": {"NoiseController": {"base_noice": 1}}}, "'base_noice' of a NoiseController"),
+        ({"CompositeController": {"NoiseController": {"base_noise": -1}}}, "'base_noise' must not be negative"),
+        ({"CompositeController": {"NoiseController": {"random_seed": 1.5}}}, "'random_seed'.*whole.*not 1.5"),
+        ({"CompositeController": {"NoiseController": {"random_seed": 1e20}}}, "'random_seed'.*whole.*not 1e.20"),
     ],
 )
 def test_what_is_not_done_is_refused(model, given, words) -> None:
@@ -232,6 +236,15 @@ def test_noise_is_as_large_as_it_is_asked_for(model) -> None:
     first, place = calm.rows[0], calm.columns.index("elbow.value")
     width = 0.01 + 0.1 * abs(first[place])
     assert felt.rows[0, place] == pytest.approx(first[place] + width * normal(123, 1, 0, place), abs=1e-12)
+
+
+def test_what_no_reflex_drives_has_noise_too(model) -> None:
+    """As in SCONE; noise in proportion to no control is none."""
+    one = {"dual_sided": 0, "DofReflex": {"target": "flexor", "source": "elbow", "KP": 1}}
+    for noise, drives in (({"base_noise": 5.0}, True), ({"proportional_noise": 5.0}, False)):
+        both = {"CompositeController": {"ReflexController": one, "NoiseController": noise}}
+        extensor = simulate(model, 0.2, controller=osimlite.Feedback(both)).controller["/forceset/extensor"]
+        assert extensor.max() == float(drives)
 
 
 def test_seeds_are_exact(model) -> None:
