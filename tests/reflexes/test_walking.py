@@ -78,6 +78,19 @@ def test_walks_begin_with_the_weight_that_is_asked_for(ours) -> None:
     assert candidates.walkers.loads().sum() == pytest.approx(0.5, rel=0.1)
 
 
+def test_a_scenario_that_somebody_changed_is_kept(tmp_path) -> None:
+    file = write_scenario(tmp_path)
+    assert write_scenario(tmp_path) == file
+    for name in ("human-walks.scone", "human.osim"):
+        path = tmp_path / name
+        before = path.read_bytes()
+        path.write_bytes(before + b" ")
+        with pytest.raises(OsimliteError, match=f"{name}' is there already, and changed"):
+            write_scenario(tmp_path)
+        assert path.read_bytes() == before + b" "
+        path.write_bytes(before)
+
+
 def test_a_file_of_states_is_a_start(tmp_path) -> None:
     from osimlite.simulation.files.storage import write_sto
 

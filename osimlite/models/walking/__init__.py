@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from osimlite.document.printer import write
+from osimlite.document.printer import to_text
+from osimlite.errors import SettingError
 from osimlite.files import make_folder, write_atomically
 from osimlite.models.jumper import jumper
 from osimlite.schema.coordinates import Coordinate
@@ -45,10 +46,18 @@ def write_scenario(folder: Path) -> Path:
     """Write the human and the scenario into a folder, to be run and changed; the path of the scenario.
 
     Raises:
+        SettingError: one is there already, and not as it comes.
         OsimliteError: they cannot be written.
     """
     make_folder(folder)
-    write(human(), folder / "human.osim")
+    files = {folder / "human.osim": to_text(human()).encode()}
     for ending in ENDINGS:
-        write_atomically(folder / f"{SCENARIO}{ending}", Path(__file__).with_name(f"{SCENARIO}{ending}").read_bytes())
+        files[folder / f"{SCENARIO}{ending}"] = Path(__file__).with_name(f"{SCENARIO}{ending}").read_bytes()
+    for path, content in files.items():
+        if path.exists() and path.read_bytes() != content:
+            raise SettingError(
+                f"'{path}' is there already, and changed: run '{folder / SCENARIO}.scone', or take another folder"
+            )
+    for path, content in files.items():
+        write_atomically(path, content)
     return folder / f"{SCENARIO}.scone"
