@@ -60,12 +60,15 @@ def simulate(
     """
     from osimlite._require import require
     from osimlite.document.reader import read
-    from osimlite.errors import SimulationError
+    from osimlite.errors import SettingError, SimulationError
 
     if plot:
         require("matplotlib", extra="plot", purpose="drawing")
     if animate:
         require("PIL", extra="view", purpose="an animation")
+    results, before = options.results_folder(file, output), chosen["resume"]
+    if before is not None and results.resolve() == Path(before).resolve():
+        raise SettingError(f"'{results}' has what went before; name another folder with -o")
     model, feedback = read(file), options.feedback(controller, par)
     if controls:
         from osimlite.simulation.given_controls import words_to_controls
@@ -82,7 +85,6 @@ def simulate(
         initial = {} if states is None else simulation.state_in(states)
         initial |= options.quantities(start, simulation.mechanism, "--set", simulation.state.paths)
         speeds = options.quantities(start_speed, simulation.mechanism, "--set-speed")
-        results = options.results_folder(file, output)
         try:
             with motion_bar("simulating", to) as progress:
                 trajectory = simulation.run(

@@ -189,6 +189,18 @@ def test_a_motion_goes_on_from_a_file_of_states(tmp_path):
     assert two.rows[0, same].tolist() == one.rows[-1, same].tolist()
 
 
+def test_what_a_motion_goes_on_from_is_not_replaced(tmp_path):
+    osimlite.write(damped(), tmp_path / "damped.osim")
+    assert run("simulate", "damped.osim", "--to", "0.05", folder=tmp_path).code == 0
+    before = (tmp_path / "damped" / "states.sto").read_bytes()
+    again = "simulate", "damped.osim", "--to", "0.1", "--resume", "damped"
+    for words in ((), ("-o", tmp_path / "damped")):
+        done = run(*again, *words, folder=tmp_path)
+        assert done.code == 2 and "has what went before; name another folder with -o" in done.err
+    assert (tmp_path / "damped" / "states.sto").read_bytes() == before
+    assert run(*again, "-o", "second", folder=tmp_path).code == 0
+
+
 WITHOUT_PYBULLET = "import sys; sys.modules['pybullet'] = None; from osimlite.cli import main; main()"
 
 
