@@ -55,7 +55,7 @@ class Feedback:
         holder, model = top, top
         if objective is not None:
             holder, model = objective, objective.get("ModelOpenSim4") or Node()
-        found = next(iter(holder.all_of(*CONTROLLERS)), None)
+        found = holder.one_of(*CONTROLLERS)
         if found is None:
             raise holder.error(f"a controller is needed: {listed(list(CONTROLLERS))}")
         self._kind, self._node = found

@@ -130,7 +130,7 @@ class Scenario:
                     "initial_equilibration_activation", "max_integration_step_size"):  # fmt: skip
             settings.get(key)
         settings.expect_all_asked("a ModelOpenSim4")
-        controller, measure = (next(iter(objective.all_of(*names)), None) for names in (CONTROLLERS, MEASURES))
+        controller, measure = objective.one_of(*CONTROLLERS), objective.one_of(*MEASURES)
         if controller is None:
             other = next((name for name, _ in objective.parts if name.endswith("Controller")), "none")
             raise objective.error(f"of controllers {listed(list(CONTROLLERS))} are done here, and this has {other}")

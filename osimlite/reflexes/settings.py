@@ -98,6 +98,17 @@ class Node:
         self.asked.update(names)
         return ((name, node) for name, node in self.parts if name in names)
 
+    def one_of(self, *names: str) -> tuple[str, Node] | None:
+        """The part that has one of some names.
+
+        Raises:
+            DocumentError: there are several.
+        """
+        found = [*self.all_of(*names)]
+        if len(found) > 1:
+            raise found[1][1].error(f"'{found[1][0]}' stands beside '{found[0][0]}'; join them in a composite one")
+        return found[0] if found else None
+
     def error(self, message: str) -> DocumentError:
         """An error about this place."""
         return DocumentError(message, file=self.file, line=self.line or None)

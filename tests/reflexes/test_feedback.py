@@ -173,6 +173,8 @@ def test_what_has_no_meaning_is_refused(model, tmp_path) -> None:
     ("given", "words"),
     [
         ({"DofReflex": {}}, "a controller is needed"),
+        ({"ReflexController": [REFLEXES] * 2}, "'ReflexController' stands beside 'ReflexController'; join them"),
+        ({"ReflexController": REFLEXES, "CompositeController": {}}, "'CompositeController' stands beside 'Reflex"),
         ({"ReflexController": REFLEXES, "fixed_control_step_size": 0}, "control step of 0 s"),
         ({"ReflexController": REFLEXES, "measure": 1}, "'measure' of a file of a controller is not done here"),
         ({"CompositeController": {"NoiseControler": {}}}, "'NoiseControler'.*did you mean 'NoiseController'"),
