@@ -136,7 +136,8 @@ def accelerations(state: Kinematics, applied: Array) -> Array:
     with numbers(w):
         composite_rigid_body(s, w, right)
     matrix = program.mass_matrix(w)
-    require_numbers(mechanism, matrix, np.array(right), *state.all_equations[1:])
+    require_numbers(mechanism, matrix, np.array(right))
+    require_numbers(mechanism, *state.all_equations[1:])
     status = OUTCOME.SINGULAR_MASS
     with suppress(ArithmeticError, ValueError):
         if not size or not program.constraints:

@@ -193,3 +193,10 @@ def test_a_number_that_is_not_finite_is_refused(bad):
         for arguments in (([bad], [0.0]), ([0.0], [0.0], [bad])):
             with pytest.raises(SimulationError, match="not finite"):
                 pendulum.acceleration(*arguments)
+    tree = mixed_tree()
+    first = tree.turning[0].coordinates[0]
+    infos = [dataclasses.replace(info, locked=place == first) for place, info in enumerate(tree.coordinates)]
+    locked = dataclasses.replace(tree, coordinates=tuple(infos))
+    for q, u in (({tree.coordinate_names[first]: bad}, {}), ({}, {tree.coordinate_names[first]: bad})):
+        with pytest.raises(SimulationError, match="not finite"):
+            locked.acceleration(q, u)
