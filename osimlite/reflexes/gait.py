@@ -110,7 +110,7 @@ def strides_of(times: Array, way: Array, loads: Array) -> Strides | None:
         for first, last in pairwise(begins):
             there = load[first:last][on[first:last]]
             middle = len(there) // 2
-            one, two = int(np.argmax(there[:middle])), middle + int(np.argmax(there[middle:]))
+            one, two = int(np.argmax(there[: middle or 1])), middle + int(np.argmax(there[middle:]))
             humps.append((there[one], there[one : two + 1].min(), there[two]))
     start, end = min(begins[0] for begins in spans), max(begins[-1] for begins in spans)
     count = sum(len(begins) - 1 for begins in spans)

@@ -41,6 +41,14 @@ def test_scuffs_and_bounces_are_no_steps() -> None:
     assert found[:5] == expected[:5]
 
 
+def test_a_stance_may_be_one_moment() -> None:
+    times = np.arange(0.0, 4.0, 0.1)
+    loads = np.zeros((40, 2))
+    loads[::5, 0] = loads[2::5, 1] = 0.8
+    found = strides_of(times, times, loads)
+    assert found is not None and found.humps == pytest.approx((0.8, 0.8, 0.8), abs=1e-15)
+
+
 def test_our_human_s_gait(tmp_path) -> None:
     scenario = Scenario(write_scenario(tmp_path))
     walked = scenario.walk(scenario.best(), duration=6.0)
