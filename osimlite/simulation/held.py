@@ -8,7 +8,7 @@ the table and the state at a control step goes on to the last bit as if it had n
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import floor
+from math import floor, inf
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -156,8 +156,12 @@ class HeldRuns:
         self._room[0, :LEGS], self._excitations[0], self.next_step = last[:LEGS], last[LEGS:-1], float(last[-1])
         self._progress[0, [STEPS, FRAMES]] = plan[REFLEXES.FIRST] = frames
 
-    def table(self) -> StoTable:
-        """What was recorded of a single run, after the last rows of the one before that a further one would need."""
+    def table(self, end: float = inf) -> StoTable:
+        """What was recorded of a single run, after the last rows of the one before that a further one would need.
+
+        Args:
+            end: of the motion, s; that of one which was interrupted may lie before the last control steps.
+        """
         new = int(self._progress[0, STEPS] - self._plan[REFLEXES.FIRST])
         times = self.held.step * np.arange(self._progress[0, STEPS] - new, self._progress[0, STEPS], dtype=np.float64)
         rows = self._record[:new].copy()
@@ -165,7 +169,8 @@ class HeldRuns:
             kept = int(self._plan[REFLEXES.KEPT])
             times = np.concatenate([self._before.times[-kept:], times])
             rows = np.concatenate([self._before.rows[-kept:], rows])
-        return StoTable("controller", times, self.held.columns, rows)
+        count = int(np.searchsorted(times, end + NEAR * self.held.step, side="right"))
+        return StoTable("controller", times[:count], self.held.columns, rows[:count])
 
     def added_to(self, controls: Controls) -> Controls:
         """Controls with what the controller has added in a single run, as functions of time."""

@@ -267,13 +267,13 @@ class Simulation:
         settings = Settings(accuracy, integrator, fixed_step, self.engine.route, chosen.show)
         runs = None if held is None else held.runs(self.engine, opened, to, before)
         recorder, stepper, states = self._moved(y, replace(settings, held=runs), times, chosen.progress)
-        table = None if runs is None else runs.table()
         if runs is not None:
             controls = runs.added_to(controls)
         times = times[: len(states)]
         if times[-1] < stepper.time:
             # Where it was ended, which somebody may want to go on from.
             times, states = [*times, stepper.time], [*states, stepper.state]
+        table = None if runs is None else runs.table(times[-1])
         if not isfinite(sum(states[-1])):
             raise SimulationError("the motion is not finite any more; ask for more accuracy")
         wall = time.perf_counter() - started

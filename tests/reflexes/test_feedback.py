@@ -15,6 +15,7 @@ from osimlite.gym.tasks import arm as task
 from osimlite.kernels.reflexes import normal, philox
 from osimlite.models.walking import write_scenario
 from osimlite.reflexes.scenario import Scenario
+from osimlite.simulation.held import HeldRuns
 from osimlite.simulation.trajectory import Interrupted
 
 REFLEXES = {
@@ -67,6 +68,36 @@ def test_controls_are_sums_of_what_was_felt(model) -> None:
     assert np.ptp(told["/forceset/flexor"]) > 0.1 and (told["/forceset/motor"] == 0.0).all()
 
 
+def test_what_was_interrupted_goes_on(model) -> None:
+    feedback = osimlite.Feedback({"ReflexController": REFLEXES})
+
+    def stop(time: float, _: Any = None) -> None:
+        if time > 0.0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted) as stopped:
+        simulate(model, 1000.0, controller=feedback, report_interval=0.3, progress=stop)
+    first: Any = stopped.value.trajectory
+    end = first.times[-1]
+    assert 0.0 <= end - first.controller.times[-1] < STEP
+    assert simulate(model, end + 0.01, controller=feedback, resume=first).times[0] == end
+
+
+def test_a_record_ends_with_the_motion(model, monkeypatch) -> None:
+    """A signal may come when control steps are recorded whose states are not kept."""
+    seen, table = [], HeldRuns.table
+
+    def noted(self: HeldRuns, *end: float) -> Any:
+        seen.append(self)
+        return table(self, *end)
+
+    monkeypatch.setattr(HeldRuns, "table", noted)
+    simulate(model, 0.1, controller=osimlite.Feedback({"ReflexController": REFLEXES}))
+    for end, last in ((0.0525, 0.05), (0.055, 0.055), (1.0, 0.1)):
+        cut = seen[0].table(end)
+        assert cut.times[-1] == pytest.approx(last, abs=1e-12) and len(cut.rows) == len(cut.times)
+
+
 @pytest.mark.parametrize("integrator", ["merson", "euler2", "rosenbrock", "bdf", "adams"])
 def test_runs_go_on_bit_for_bit(model, integrator, tmp_path) -> None:
     feedback = osimlite.Feedback({"ReflexController": REFLEXES})
@@ -115,7 +146,7 @@ def test_an_interrupted_run_goes_on(model) -> None:
 
     with pytest.raises(Interrupted) as stopped:
         simulate(model, 0.5, controller=feedback, progress=stop)
-    first = stopped.value.trajectory
+    first: Any = stopped.value.trajectory
     second = simulate(model, 0.5, controller=feedback, resume=first)
     whole = simulate(model, 0.5, controller=feedback)
     assert 0.1 < second.times[0] < 0.5 and second.values[-1] == pytest.approx(whole.values[-1], abs=1e-6)
