@@ -8,7 +8,7 @@ from typing import Annotated
 from osimlite.cli import _options as options
 from osimlite.cli._command import Argument, Option, command
 
-UNITS = {"speed": "m/s", "power": "W/kg", "transport": "J/(kg m)"}
+UNITS = {"speed": "m/s", "power": "W/kg", "transport": "J/(kg m)", "jump height": "cm", "early rise": "cm"}
 """Of what measures report."""
 
 
@@ -45,7 +45,8 @@ def scone(
     """Have the human of a scenario walk, or look for the parameters with which it does best.
 
     Of SCONE's parts are there: ModelOpenSim4, GaitStateController with its reflexes of muscles and coordinates,
-    measures of gait, effort, coordinates and forces of the ground, CMA-ES. All else is refused by its name and line.
+    functions of time, measures of gait, jumps, effort, coordinates and forces of the ground, CMA-ES. All else is
+    refused by its name and line.
 
     What comes out can be looked at: osimlite view walk/human.osim walk/states.sto
 

@@ -13,9 +13,12 @@ from osimlite.kernels.layout import Record
 from osimlite.kernels.pointers import Floats, Ints, at
 from osimlite.kernels.senses import SENSED, SENSES, foot
 
-GAIT, NUMBER, LARGEST_LOAD, WHOLE_LOAD, POWERS, TENSIONS, WANG = range(7)
-"""Kinds: steps; how far a number of a row, the load of a leg or that of both are beyond a range; what muscles take."""
+GAIT, JUMP, NUMBER, LARGEST_LOAD, WHOLE_LOAD, POWERS, TENSIONS, WANG = range(8)
+"""Kinds: steps; a jump; how far a number of a row, the load of a leg or that of both are beyond a range; what
+muscles take."""
 QUARTER = 0.5 * pi
+PREPARES, TAKES_OFF, FLIES, COMES_DOWN = range(4)
+"""What a jumper does."""
 AT_REST = 1.51
 """Power of a body at rest, W/kg (J. M. Wang et al., ACM Trans. Graph. 31, 2012)."""
 
@@ -29,10 +32,12 @@ class CRITERION(metaclass=Record):
 class CRITERION_NUMBERS(metaclass=Record):
     """Of all; of a range what follows: a factor of the number, least and largest, penalties of what is beyond and of
     its square; of a gait: least height of the mass centre over that at the start, load of a foot that touches, shortest
-    time of a step; of Wang's effort: part of slow fibers, and of each muscle the mass (kg)."""
+    time of a step; of a jump: least height likewise, time to prepare (s), whether it ends at the peak; of Wang's
+    effort: part of slow fibers, and of each muscle the mass (kg)."""
 
     START, STOP, FACTOR, LOW, HIGH, LINEAR, SQUARED = range(7)
     HEIGHT, LOAD, SHORTEST = 2, 3, 4
+    PREPARE, AT_PEAK = 3, 4
     SLOW, MASSES = 2, 3
 
 
@@ -50,6 +55,13 @@ class GAIT_NOTED(metaclass=Record):
     BEFORE, HERE, HEIGHT, FALLEN, COUNT, TOUCHES, STEPS = 0, 1, 2, 3, 4, 5, 7
 
 
+class JUMP_NOTED(metaclass=Record):
+    """Height of the mass centre at the start, now, at the highest and when the jumper began to take off (m); whether it
+    has sunk or come down, see PREPARES."""
+
+    START, HERE, PEAK, PREPARED, ENDED, DOES = range(6)
+
+
 def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
     """Begin anew with a row."""
     for number in range(i[0]):
@@ -60,6 +72,10 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
             noted[GAIT_NOTED.HEIGHT] = row[centre + 1]
             noted[GAIT_NOTED.FALLEN] = noted[GAIT_NOTED.COUNT] = 0.0
             noted[GAIT_NOTED.TOUCHES] = noted[GAIT_NOTED.TOUCHES + 1] = -1.0
+        elif own[CRITERION.KIND] == JUMP:
+            for k in range(JUMP_NOTED.ENDED):
+                noted[k] = row[centre + 1]
+            noted[JUMP_NOTED.ENDED], noted[JUMP_NOTED.DOES] = 0.0, PREPARES
         else:
             for k in range(NOTED.SIZE):
                 noted[k] = 0.0
@@ -70,7 +86,7 @@ def judged(
     senses: Ints, known: Floats, i: Ints, p: Floats, t: float, row: Floats, active: Ints, y: Floats, u: Floats,
     room: Floats,
 ) -> bool:  # fmt: skip
-    """Note a row, and tell whether the walker has fallen.
+    """Note a row, and tell whether the walker has fallen, or its jump has ended.
 
     Args:
         senses: plan of the row.
@@ -93,6 +109,10 @@ def judged(
         if own[CRITERION.KIND] == GAIT:
             note_gait(senses, numbers, t, row, noted)
             has_fallen = has_fallen or noted[GAIT_NOTED.FALLEN] > 0.0
+            continue
+        if own[CRITERION.KIND] == JUMP:
+            note_jump(senses, numbers, t, row, noted)
+            has_fallen = has_fallen or noted[JUMP_NOTED.ENDED] > 0.0
             continue
         if own[CRITERION.KIND] == WANG:
             value = wang(senses, known, numbers, row, active, y, u)
@@ -143,6 +163,23 @@ def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
         step[0], step[1] = t, noted[GAIT_NOTED.HERE] - noted[GAIT_NOTED.BEFORE]
         noted[GAIT_NOTED.BEFORE] = noted[GAIT_NOTED.HERE]
         noted[GAIT_NOTED.COUNT] += 1.0
+
+
+def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
+    """Follow the height of the mass centre, and what the jumper does: it takes off once it rises after its time to
+    prepare, and comes down when it sinks, or is on the ground after a flight."""
+    height, rise, does = row[senses[SENSES.CENTRE] + 1], row[senses[SENSES.RISE]], noted[JUMP_NOTED.DOES]
+    has_load = row[senses[SENSES.LOADS]] + row[senses[SENSES.LOADS] + 1] > 0.0
+    noted[JUMP_NOTED.HERE], noted[JUMP_NOTED.PEAK] = height, max(noted[JUMP_NOTED.PEAK], height)
+    if height < numbers[CRITERION_NUMBERS.HEIGHT] * noted[JUMP_NOTED.START]:
+        noted[JUMP_NOTED.ENDED] = 1.0
+    elif does == PREPARES:
+        if t >= numbers[CRITERION_NUMBERS.PREPARE] and (rise > 0.0 or not has_load):
+            noted[JUMP_NOTED.DOES], noted[JUMP_NOTED.PREPARED] = TAKES_OFF, height
+    elif does == TAKES_OFF and not has_load:
+        noted[JUMP_NOTED.DOES] = FLIES
+    elif does < COMES_DOWN and (rise < 0.0 or (does == FLIES and has_load)):
+        noted[JUMP_NOTED.DOES], noted[JUMP_NOTED.ENDED] = COMES_DOWN, numbers[CRITERION_NUMBERS.AT_PEAK]
 
 
 def penalty(senses: Ints, kind: int, place: int, numbers: Floats, row: Floats) -> float:

@@ -2,7 +2,8 @@
 
 The integers are a head, `REFLEXES`; of each term `TERM`; of each gate the sensors of a coordinate and of its speed. The
 numbers of a candidate are a head, `LIMITS`, in which each leg has its own; of each term delay, gain and offset; of each
-gate delay, least and largest value. Delays are in control steps.
+gate delay, least and largest value. Delays are in control steps. A term without a sensor is ``gain * (t -
+delay)**power`` from its delay on, with the time t in control steps.
 
 Noise is drawn anew at each control step, from a seed, the number of the step and that of what is noisy alone.
 """
@@ -42,7 +43,7 @@ class REFLEXES(metaclass=Record):
 
 
 class TERM(metaclass=Record):
-    """Muscle, sensor (-1 for none, so that the gain itself is added), what may not be negative, the leg whose states
+    """Muscle, sensor (-1 for none), what may not be negative (without a sensor the power of time), the leg whose states
     decide, these as bits, and the number of what may suppress it or -1."""
 
     TARGET, SENSOR, KIND, LEG, STATES, GATE, SIZE = range(7)
@@ -157,6 +158,12 @@ def add_reflexes(i: Ints, p: Floats, frames: int, history: Floats, legs: Floats,
             value *= own[1]
             if term[TERM.KIND] == OF_RESULT:
                 value = max(value, 0.0)
+        else:
+            since = frames - 1.0 - own[0]
+            if since < -NEAR:
+                continue
+            for _ in range(term[TERM.KIND]):
+                value *= since
         result[term[TERM.TARGET]] += value
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from osimlite.forces.vectors import ZERO, Vector, along, norm, over, plus, put, vector
 from osimlite.kernels.layout import CONTACT_WORK, MODEL, Record
 from osimlite.kernels.pointers import Floats, Ints, at
-from osimlite.kernels.points import station
+from osimlite.kernels.points import station, velocity
 from osimlite.kernels.states import copy
 
 OF_MUSCLES = "fiber_length", "fiber_velocity", "tension", "active_fiber_force"
@@ -24,10 +24,10 @@ class SENSES(metaclass=Record):
     """Counts, of controls and of the numbers too, and where a row has what is felt: lengths of fibers over the optimal
     ones, velocities (of these lengths per s), forces of tendons over the strengths, values of coordinates and their
     speeds, forces of the ground on each leg over the weight; active forces of fibers (N), forces that limit coordinates
-    (N, N m), mass centres of bodies and the common one (m)."""
+    (N, N m), mass centres of bodies and the common one (m), how fast that rises (m/s)."""
 
     MUSCLES, COORDINATES, LEGS, LIMITS, BODIES, CONTROLS, KNOWN = range(7)
-    LENGTHS, VELOCITIES, FORCES, VALUES, SPEEDS, LOADS, ACTIVE, MOMENTS, PLACES, CENTRE, SIZE, HEAD = range(7, 19)
+    LENGTHS, VELOCITIES, FORCES, VALUES, SPEEDS, LOADS, ACTIVE, MOMENTS, PLACES, CENTRE, RISE, SIZE, HEAD = range(7, 20)
 
 
 class SENSED(metaclass=Record):
@@ -52,13 +52,15 @@ def feel(s: Ints, w: Floats, y: Floats, i: Ints, p: Floats, row: Floats) -> None
         moments[k] = 0.0
     for k in range(i[SENSES.LIMITS]):
         moments[limits[2 * k]] = w[limits[2 * k + 1]]
-    links, total = at(limits, 2 * i[SENSES.LIMITS]), ZERO
+    links, total, rise = at(limits, 2 * i[SENSES.LIMITS]), ZERO, 0.0
     centres = at(strengths, muscles + 2 * i[SENSES.CONTROLS])
     for k in range(bodies):
         place = station(s, w, links[k], vector(centres, 3 * k))
         put(row, i[SENSES.PLACES] + 3 * k, place)
         total = along(total, centres[3 * bodies + k], place)
+        rise += centres[3 * bodies + k] * velocity(s, w, links[k], place)[1]
     put(row, i[SENSES.CENTRE], over(total, p[SENSED.MASS]))
+    row[i[SENSES.RISE]] = rise / p[SENSED.MASS]
     for k in range(i[SENSES.LEGS]):
         leg, push = at(links, bodies + OF_LEG * k), ZERO
         for pair in range(leg[2], leg[3]):

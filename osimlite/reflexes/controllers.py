@@ -1,10 +1,13 @@
-"""Reflexes of muscles and coordinates, on while a leg is in some state: SCONE's GaitStateController; noise.
+"""Reflexes of muscles and coordinates, on while a leg is in some state: SCONE's GaitStateController; functions of time;
+noise.
 
-All reflexes are sums of terms ``gain * (sensor - offset)`` with a delay, which the kernels add.
+All reflexes are sums of terms ``gain * (sensor - offset)`` with a delay, functions of time sums of terms ``gain * (t -
+start)**power``, which the kernels add.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -16,13 +19,13 @@ from osimlite.kernels.walks import LEGS
 from osimlite.multibody.spatial import Array
 from osimlite.quantity import tell
 from osimlite.reflexes.parameters import Parameters
-from osimlite.reflexes.settings import Node
+from osimlite.reflexes.settings import Node, matches
 from osimlite.reflexes.walkers import SIDES, Felt
-from osimlite.text import or_known
+from osimlite.text import listed, or_known
 
 STATES = "EarlyStance", "LateStance", "Liftoff", "Swing", "Landing"
-COMPOSITE, NOISE = "CompositeController", "NoiseController"
-CONTROLLERS = "GaitStateController", "ReflexController", COMPOSITE
+COMPOSITE, FEED_FORWARD, NOISE = "CompositeController", "FeedForwardController", "NoiseController"
+CONTROLLERS = "GaitStateController", "ReflexController", FEED_FORWARD, COMPOSITE
 """What is done here, and besides noise within a CompositeController."""
 KINDS = "MuscleReflex", "ConditionalMuscleReflex", "DofReflex"
 """Of reflexes."""
@@ -41,8 +44,63 @@ class Part(NamedTuple):
     second: Array  # offset, or largest value
 
 
+Powers = Iterable[tuple[int, Array, Array]]
+"""Terms that a function of time is the sum of: power, and of each candidate start (s) and gain (w,)."""
+
+
+def _whole(node: Node, key: str, least: int) -> int:
+    number = node.number(key)
+    if number not in range(least, MOST_POINTS + 1):
+        raise node.error(f"'{key}' must be a whole number from {least} to {MOST_POINTS}, not {number:g}")
+    return int(number)
+
+
+def _points(node: Node, parameters: Parameters, before: str) -> tuple[Array, Array]:
+    """Times (n, w) and values of the control points of a function."""
+    count = _whole(node, "control_points", 1)
+    node.text("control_point_y")
+    if node.get("control_point_dt") is None and count > 1:
+        raise node.error("several control points need 'control_point_dt'")
+    values = [parameters.of(node, "control_point_y", 0.0, f"{before}Y{k}") for k in range(count)]
+    spans = [parameters.of(node, "control_point_dt", 0.0, f"{before}DT{k}") for k in range(count - 1)]
+    if np.any(np.array(spans) <= 0.0):
+        raise node.error("'control_point_dt' must be positive")
+    return np.cumsum([np.zeros_like(values[0]), *spans], axis=0), np.array(values)
+
+
+def _constants(node: Node, parameters: Parameters, before: str) -> Powers:
+    times, values = _points(node, parameters, before)
+    return [(0, *each) for each in zip(times, np.diff(values, axis=0, prepend=0.0), strict=True)]
+
+
+def _lines(node: Node, parameters: Parameters, before: str) -> Powers:
+    """The last goes on, unless it is flat there."""
+    times, values = _points(node, parameters, before)
+    slopes = np.diff(values, axis=0) / np.diff(times, axis=0)
+    ends = [np.zeros_like(values[:1])] if node.flag("flat_extrapolation", False) else []
+    bends = np.diff(np.concatenate([np.zeros_like(values[:1]), slopes, *ends]), axis=0)
+    return [(0, times[0], values[0]), *((1, *each) for each in zip(times, bends, strict=False))]
+
+
+def _polynomial(node: Node, parameters: Parameters, before: str) -> Powers:
+    degree = _whole(node, "degree" if node.get("order") is None else "order", 0)
+    for k in range(degree + 1):
+        node.text(f"coefficient{k}")
+    gains = [parameters.of(node, f"coefficient{k}", 0.0, f"{before}C{k}") for k in range(degree + 1)]
+    return [(k, np.zeros_like(gain), gain) for k, gain in enumerate(gains)]
+
+
+MOST_POINTS = 99
+FUNCTIONS: dict[str, Callable[[Node, Parameters, str], Powers]] = {
+    "PieceWiseConstant": _constants,
+    "PieceWiseLinear": _lines,
+    "Polynomial": _polynomial,
+}
+"""Of time, by the names that scenarios have for them."""
+
+
 class Reflexes:
-    """Reflexes whose legs are in one of five states (GaitStateController), reflexes alone, both, and noise.
+    """Reflexes whose legs are in one of five states (GaitStateController), reflexes alone, functions of time, noise.
 
     Args:
         node: of the controller.
@@ -70,6 +128,8 @@ class Reflexes:
         for name, part in parts:
             if name == NOISE:
                 self._read_noise(part)
+            elif name == FEED_FORWARD:
+                self._read_functions(part, parameters)
             elif name == "ReflexController":
                 self.symmetric, self._is_sided = part.flag("symmetric", False), part.flag("dual_sided", True)
                 for leg in (0, 1) if self._is_sided else (0,):
@@ -96,6 +156,25 @@ class Reflexes:
         node.expect_all_asked(f"a {NOISE}")
         if node.file.endswith(".scone"):
             tell("noise is as large as SCONE's, but not the same: its numbers depend on the compiler of SCONE")
+
+    def _read_functions(self, node: Node, parameters: Parameters) -> None:
+        """What excites actuators over time, the same on both sides if it is symmetric."""
+        symmetric = node.flag("symmetric", True)
+        include, exclude = node.text("include", "*"), node.text("exclude", "")
+        found = [*node.all_of(*FUNCTIONS)]
+        node.expect_all_asked(f"a {FEED_FORWARD}")
+        if len(found) != 1:
+            raise node.error(f"a {FEED_FORWARD} needs one function: {listed(list(FUNCTIONS))}")
+        kind, function = found[0]
+        names = {k: n for k, n in enumerate(self.walkers.names) if matches(n, include) and not matches(n, exclude)}
+        if not names:
+            raise node.error(f"no actuator is in '{include}' and not in '{exclude}'")
+        for target, name in names.items():
+            before = name[:-2] if symmetric and name.endswith(SIDES) else name
+            for power, start, gain in FUNCTIONS[kind](function, parameters, f"{before}."):
+                term = target, -1, power, 0, (1 << len(STATES)) - 1, -1
+                self.terms.append(Part(term, start, gain * self.walkers.step**power, np.zeros_like(gain)))
+        function.expect_all_asked(f"a {kind}")
 
     def _read_states(self, node: Node, parameters: Parameters) -> None:
         parameters.auto = node.number("auto_std_factor", parameters.auto)
@@ -257,7 +336,8 @@ class Reflexes:
         delays = [part.delay / self.walkers.step for part in parts]
         each = [(delay, part.first, part.second) for delay, part in zip(delays, parts, strict=True)]
         numbers = np.column_stack([self._limits, *(column for columns in each for column in columns)])
-        kept = int(np.ceil(max([*map(np.max, delays), self._limits[0, LIMITS.DELAY]]))) + 2
+        felt = (np.max(delay) for part, delay in zip(parts, delays, strict=True) if part.ints[TERM.SENSOR] >= 0)
+        kept = int(np.ceil(max([*felt, self._limits[0, LIMITS.DELAY]]))) + 2
         sensors = int(self.walkers.senses[SENSES.ACTIVE])
         head = np.zeros(REFLEXES.HEAD, dtype=np.int64)
         head[: REFLEXES.ROOM + 1] = (

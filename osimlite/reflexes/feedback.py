@@ -30,9 +30,9 @@ class Feedback:
     else drives these adds to it.
 
     Args:
-        given: file with a ReflexController, GaitStateController or CompositeController, alone or in a scenario: SCONE's
-            or YAML; or the same as data of Python. Beside one that stands alone there may be an `init`, and
-            `fixed_control_step_size` and what legs are called, which a scenario has in its ModelOpenSim4.
+        given: file with a ReflexController, GaitStateController, FeedForwardController or CompositeController, alone or
+            in a scenario: SCONE's or YAML; or the same as data of Python. Beside one that stands alone there may be an
+            `init`, and `fixed_control_step_size` and what legs are called, which a scenario has in its ModelOpenSim4.
         values: of its parameters, or a file of them (.par); others stand for the best that `init` has, or their means.
 
     Attributes:

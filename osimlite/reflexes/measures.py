@@ -16,10 +16,13 @@ from osimlite.kernels.criteria import (
     CRITERION,
     GAIT,
     GAIT_NOTED,
+    JUMP,
+    JUMP_NOTED,
     LARGEST_LOAD,
     NOTED,
     NUMBER,
     POWERS,
+    PREPARES,
     TENSIONS,
     WANG,
     WHOLE_LOAD,
@@ -85,7 +88,10 @@ class Measure(ABC):
         start, stop: between which it is on, s.
         report: what it says besides; of efforts by power that (W/kg), and what a way takes (J/(kg m)).
         terms: what it and those that it is made of add, by their names.
+        minimize: whether it is to become small; of a class, what it is without a setting.
     """
+
+    minimize = True
 
     def __init__(
         self, node: Node, walkers: Walkers, criteria: Criteria, above: Measure | None = None, side: str = ""
@@ -102,8 +108,7 @@ class Measure(ABC):
         self.start, self.stop = node.number("start_time", 0.0), node.number("stop_time", 0.0) or inf
         if above is not None:
             self.start, self.stop = max(self.start, above.start), min(self.stop, above.stop)
-        if not node.flag("minimize", True):
-            raise node.error("measures that are to be large are not done here")
+        self.minimize = node.flag("minimize", self.minimize)
         self.report: dict[str, Array] = {}
         self.terms: dict[str, Array] = {}
         self.read(node)
@@ -124,7 +129,7 @@ class Measure(ABC):
     def weighted(self, times: Array, duration: float) -> Array:
         """What it adds to the sum (w,), noted in `terms`."""
         value = self.result(times, duration) + self.offset
-        if self.threshold is not None:
+        if self.minimize and self.threshold is not None:
             least, over = self.threshold, self.transition
             between = value * (value - least) / over if over > 0.0 else value
             value = np.where(value < least, 0.0, np.where(value < least + over, between, value))
@@ -189,6 +194,32 @@ class GaitMeasure(Measure):
             counts[k] = len(steps)
         self.report = {"speed": speeds, "steps": counts}
         return result
+
+
+class JumpMeasure(Measure):
+    """How high the mass centre comes, in cm."""
+
+    minimize = False
+
+    def read(self, node: Node) -> None:
+        """As `Measure` says."""
+        for key in ("jump_type", "jump_angle", "body", "target_body", "offset", "recover_time"):
+            if node.get(key) is not None:
+                raise node.error(f"'{key}' of a JumpMeasure is not done here")
+        self.walkers.expect_legs()
+        self.negates, at_peak = node.flag("negate_result", False), node.flag("terminate_on_peak", True)
+        numbers = node.number("termination_height", 0.5), node.number("prepare_time", 0.2), float(at_peak)
+        self._first = self.criteria.add(JUMP, 0, self, *numbers)
+
+    def result(self, times: Array, duration: float) -> Array:
+        """As `Measure` says; of one that has not taken off, where it would be after a second."""
+        start, here, peak, prepared, does = (
+            self.noted(self._first, getattr(JUMP_NOTED, name)) for name in ("START", "HERE", "PEAK", "PREPARED", "DOES")
+        )
+        early = 100.0 * np.maximum(prepared - start, 0.0)
+        self.report = {"jump height": 100.0 * peak, "early rise": early}
+        found = np.where(does == PREPARES, 100.0 * (start + (here - start) / times), 100.0 * peak - early)
+        return -found if self.negates else found
 
 
 class EffortMeasure(Measure):
@@ -300,6 +331,7 @@ class CompositeMeasure(Measure):
             for name, part in block.all_of(*MEASURES)
             for side in (SIDES if both else (self.side,))
         ]
+        self.minimize = node.flag("minimize", not self.parts or self.parts[0].minimize)
 
     def result(self, times: Array, duration: float) -> Array:
         """As `Measure` says."""
@@ -311,6 +343,7 @@ class CompositeMeasure(Measure):
 
 
 MEASURES: dict[str, Any] = {
-    cls.__name__: cls for cls in (GaitMeasure, EffortMeasure, DofMeasure, ReactionForceMeasure, CompositeMeasure)
+    cls.__name__: cls
+    for cls in (GaitMeasure, JumpMeasure, EffortMeasure, DofMeasure, ReactionForceMeasure, CompositeMeasure)
 }
 """By the names that scenarios have for them."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import fnmatch
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from osimlite.records import dataclass
 from osimlite.reflexes.controllers import CONTROLLERS, Reflexes
 from osimlite.reflexes.measures import MEASURES, Criteria, Measure
 from osimlite.reflexes.parameters import Parameter, Parameters, read_par
-from osimlite.reflexes.settings import Node, found_file, read_settings, settings_of
+from osimlite.reflexes.settings import Node, found_file, matches, read_settings, settings_of
 from osimlite.reflexes.walkers import Walkers
 from osimlite.schema.model import Model
 from osimlite.simulation.files.storage import StoTable, read_sto
@@ -48,7 +47,7 @@ class Walked:
     """What became of some candidates.
 
     Attributes:
-        results: what is to become small (w,).
+        results: what is to become small (w,); of a measure that is to be large, the negative of it.
         times: when each ended, s (w,).
         terms: parts of the results, by the names of measures.
         report: what measures say besides.
@@ -240,11 +239,11 @@ class Candidates:
             self._read_state(found_file(file, scenario.folder))
         offset = node.get("initial_state_offset")
         if offset is not None:
-            included = node.text("initial_state_offset_include", "*").split(";")
-            excluded = [*node.text("initial_state_offset_exclude", "").split(";"), "*/activation", "*/fiber_length"]
+            included = node.text("initial_state_offset_include", "*")
+            excluded = node.text("initial_state_offset_exclude", "") + ";*/activation;*/fiber_length"
             symmetric = node.flag("initial_state_offset_symmetric", False)
             for path, place in walkers.places.items():
-                if _matches(path, included) and not _matches(path, excluded):
+                if matches(path, included) and not matches(path, excluded):
                     name = path.replace("_l/", "/").replace("_r/", "/") if symmetric else path
                     states[:, place] += self.parameters.read(offset, f"{name}.offset")
 
@@ -284,7 +283,7 @@ class Candidates:
                 break
         rows.append(np.concatenate([walkers.copies.states[0], walkers.excitations[0], walkers.loads()[0]])[None])
         times = walkers.step * walkers.progress[:, STEPS].astype(np.float64)
-        results = self.measure.weighted(times, self.duration)
+        results = self.measure.weighted(times, self.duration) * (1.0 if self.measure.minimize else -1.0)
         return Walked(results, times, self.measure.terms, self.measure.report, *self._tables(np.concatenate(rows)))
 
     def _tables(self, rows: Array) -> tuple[StoTable, StoTable, StoTable]:
@@ -318,10 +317,6 @@ def legs_of(node: Node) -> dict[str, str]:
         "lower": node.text("leg_lower_body", ""),
         "contact": node.text("leg_contact_force", "foot"),
     }
-
-
-def _matches(path: str, patterns: Sequence[str]) -> bool:
-    return any(fnmatch.fnmatchcase(path, pattern) for pattern in patterns if pattern)
 
 
 def _carry(walkers: Walkers, which: int, height: int, load: float) -> None:

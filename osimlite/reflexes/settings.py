@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -276,6 +277,11 @@ class _Reader:
 
     def _included(self, name: str) -> Node:
         return _read(found_file(name, self.path.parent, self.base), self.base, self.constants, self.depth + 1)
+
+
+def matches(name: str, patterns: str) -> bool:
+    """Whether a name fits one of some patterns, between which there are semicolons."""
+    return any(fnmatchcase(name, pattern) for pattern in patterns.split(";") if pattern)
 
 
 def found_file(name: str, *folders: Path) -> Path:

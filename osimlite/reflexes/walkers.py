@@ -125,7 +125,7 @@ class Felt:
             masses,
         )
         known = np.concatenate(own)
-        sizes = m, m, m, n, n, legs, m, n, 3 * b, 3
+        sizes = m, m, m, n, n, legs, m, n, 3 * b, 3, 1
         head = m, n, legs, len(limits) // 2, b, len(self.names), len(known)
         plan = [*head, 0, *np.cumsum(sizes).tolist()]
         plan += [place for path in self.paths[:m] for place in engine.places_of(path, OF_MUSCLES)] + limits

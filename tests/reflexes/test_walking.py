@@ -175,7 +175,7 @@ def test_yaml_and_data_of_python_say_the_same_as_a_scenario(arm, tmp_path) -> No
         ("target = flexor", "target = flexer", "no 'flexer'.*did you mean 'flexor'"),
         ("KV = 0.3", "KX = 0.3", "'KX' of a DofReflex is not done here"),
         ("ModelOpenSim4", "ModelHyfydy", "only ModelOpenSim4"),
-        ("ReflexController", "FeedForwardController", "this has FeedForwardController"),
+        ("ReflexController", "MirrorController", "this has MirrorController"),
         ("dual_sided = 0", "dual_sided = 0 NoiseController { base_noise = 0.1 }", "'NoiseController' of a Reflex"),
         ("dof = elbow", "dof = knee", "no coordinate 'knee'"),
         ("DofMeasure", "BodyMeasure", "a measure is needed"),
