@@ -6,7 +6,6 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
-import casadi
 import numpy as np
 
 import osimlite
@@ -93,6 +92,9 @@ class Beside:
 
     def _derivatives(self, *given: np.ndarray) -> list[np.ndarray]:
         if self._made is None:
+            # In a process with OpenSim, which cannot load it, others take what is beside this.
+            import casadi
+
             n, made = len(self.functions.states), self.functions.dynamics
             x, u, push, along = (
                 casadi.MX.sym(name, size) for name, size in zip("xupd", (n, len(given[1]), n, n), strict=True)

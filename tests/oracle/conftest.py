@@ -21,6 +21,7 @@ else:
     _names = opensim.ArrayStr()
     opensim.OpenSimObject.getRegisteredTypenames(_names)
     PRISTINE = [opensim.OpenSimObject.newInstanceOfType(_names.get(k)) for k in range(_names.getSize())]
+finally:
     # It puts its folder into the paths of libraries and programs, and with these its CasADi into processes to come.
     os.environ.clear()
     os.environ.update(_environment)
