@@ -37,9 +37,13 @@ def test_moco_s_solution_is_one_here(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", STUDIES)
-def test_ours_costs_no_more(name, solved):
+def test_ours_costs_no_more(name, solved, tmp_path):
     said, found = moco_said(name), solved(name)
     assert found.success
+    if name == "squat-25":
+        # At the tolerance of the study either search ends some 4e-4 above the optimum, where rounding has led it.
+        assert found.objective == pytest.approx(said["objective"], rel=1e-3)
+        found = solve(study(tmp_path, name, optim_convergence_tolerance=1e-5))
     assert found.objective <= said["objective"] * (1.0 + 1e-4)
     assert found.objective == pytest.approx(sum(found.terms.values()))
     if name != "squat-25":
