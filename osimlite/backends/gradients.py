@@ -21,6 +21,7 @@ from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.integrators import MERSON
 from osimlite.simulation.many import run_many
 from osimlite.simulation.pack import pack
+from osimlite.simulation.run_times import report_times
 from osimlite.simulation.runs import Runs
 from osimlite.sweep.measures import Batch, measure
 from osimlite.sweep.plan import MOST_TRIES, Plan
@@ -74,11 +75,7 @@ class Gradients:
         self._measure = measure(plan.measures[0], given.engine, plan.feet)
         if self._measure.watches:
             raise UnsupportedError(f"'{self._measure.name}' is of events; take another measure, or another --method")
-        self._times: list[float] = [0.0, plan.to]
-        if plan.interval is not None:
-            from osimlite.simulation.run_times import report_times
-
-            self._times = report_times(plan.to, plan.interval)
+        self._times = [0.0, plan.to] if plan.interval is None else report_times(plan.to, plan.interval)
         self._steps: tuple[bytes, Steps] | None = None
 
     def at(self, values: Sequence[float], free: Sequence[int]) -> Array:
@@ -168,5 +165,5 @@ class Gradients:
         if self._steps is None or self._steps[0] != variant.structure:
             engine = variant.engine
             packed = pack(engine.mechanism, replace(engine.forces, controls=engine.driving))
-            self._steps = variant.structure, Steps(packed, range(len(variant.state.names)))
+            self._steps = variant.structure, Steps(packed, engine.forces, range(len(variant.state.names)))
         return self._steps[1]

@@ -17,6 +17,7 @@ from osimlite.kernels.method import ACCEPTED, ERRORS, LAST_TIME, NEXT_STEP, REAC
 from osimlite.multibody.spatial import Array
 from osimlite.records import replace
 from osimlite.schema.model import Model, expect_model
+from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines.linking import Program, Tangents, has_compiler
 from osimlite.simulation.integrators import MERSON
@@ -49,6 +50,7 @@ class Machine:
 
     Args:
         packed: the model.
+        forces: of it.
         entries: names of the kernels that are called.
         room: for so many numbers more in the work vector.
 
@@ -56,9 +58,21 @@ class Machine:
         program: the model with the addresses of its code.
         x: the numbers.
         w: the work vector.
+
+    Raises:
+        MissingDependency: numba is not installed.
+        UnsupportedError: a force is computed in Python.
     """
 
-    def __init__(self, packed: Packed, entries: Sequence[str], room: int = 0) -> None:
+    def __init__(self, packed: Packed, forces: Forces, entries: Sequence[str], room: int = 0) -> None:
+        if not has_compiler():
+            require("numba", extra="sim", purpose="derivatives in machine code")
+        for place, kernel in packed.kernels.items():
+            if place in packed.owners and not isinstance(kernel, str):
+                path = forces.elements[packed.owners[place]].path
+                raise UnsupportedError(
+                    f"'{path}' is computed in Python, which finds no derivatives; set its appliesForce to false"
+                )
         # Nothing is projected.
         laws = tuple(name for name in packed.laws if name != "project")
         self.program = Program(replace(packed, laws=laws), _code(), entries)
@@ -87,22 +101,14 @@ class TangentModel(StatedModel):
     """
 
     def __init__(self, model: Model, parameters: Sequence[str] = (), folder: Path = Path()) -> None:
-        if not has_compiler():
-            require("numba", extra="sim", purpose="derivatives in machine code")
         super().__init__(model, parameters, folder)
         packed = self._packed
-        for place, kernel in packed.kernels.items():
-            if place in packed.owners and not isinstance(kernel, str):
-                path = self.forces.elements[packed.owners[place]].path
-                raise UnsupportedError(
-                    f"'{path}' is computed in Python, which finds no derivatives; set its appliesForce to false"
-                )
         slopes = self._parameters.slopes if self._parameters else {}
         self._parametric, self._slopes = [*slopes], np.zeros((len(slopes), len(self.parameters)))
         for row, parts in zip(self._slopes, slopes.values(), strict=True):
             for number, factor in parts:
                 row[number] = factor
-        self._machine = machine = Machine(packed, ("evaluate",))
+        self._machine = machine = Machine(packed, self.forces, ("evaluate",))
         # The controls are given, whatever the controllers of the model say.
         machine.program.ints[MODEL.CONTROLS] = 0
         first = int(packed.structure[MODEL.WORK_CONTROL])
@@ -171,7 +177,7 @@ class TangentModel(StatedModel):
     def steps(self, controls: Controls, dp: Array) -> Steps:
         """What follows a motion that controls drive, along directions of the parameters (p, m) and of the start."""
         packed = pack(self.mechanism, replace(self.forces, controls=controls), apart=self._apart)
-        result, numbers = Steps(packed, self._places), packed.numbers.copy()
+        result, numbers = Steps(packed, self.forces, self._places), packed.numbers.copy()
         changes = np.zeros((len(numbers), dp.shape[1]))
         self.put(numbers)
         self.put_along(dp, changes)
@@ -187,13 +193,14 @@ class Steps:
 
     Args:
         packed: the model with the controls of the motion.
+        forces: of it.
         places: in the packed order of the states.
     """
 
-    def __init__(self, packed: Packed, places: Sequence[int]) -> None:
+    def __init__(self, packed: Packed, forces: Forces, places: Sequence[int]) -> None:
         size, self._places = len(places), places
         method, first = int(packed.structure[MODEL.WORK_SIZE]), int(packed.structure[MODEL.WORK_STATE])
-        self._machine = machine = Machine(packed, ("evaluate", MERSON), merson.HEAD + merson.STATES * size)
+        self._machine = machine = Machine(packed, forces, ("evaluate", MERSON), merson.HEAD + merson.STATES * size)
         self._start, self._end = (np.zeros((2 * size, 1 + DIRECTIONS)) for _ in range(2))
         self._errors, self._h = machine.w[first + ERRORS * size :][:size], machine.w[method:, 0]
         self._evaluate = machine.entry("evaluate", self._start, self._start[size:])

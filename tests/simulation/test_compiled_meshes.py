@@ -6,8 +6,11 @@ import pytest
 
 import osimlite
 from osimlite import ContactMesh, ContactSphere
+from osimlite.errors import UnsupportedError
 from osimlite.schema.contact_forces import ElasticFoundationForce
 from osimlite.simulation.elements.foundation import Springs
+from osimlite.sweep import registry
+from osimlite.sweep.plan import plan
 from tests.simulation.meshes import ball, block, write_obj
 from tests.simulation.test_mesh_contact import thrown
 
@@ -92,3 +95,16 @@ def test_a_motion(tmp_path):
     assert result[0]["time_s"] == pytest.approx(expected[0]["time_s"], abs=1e-7)
     name = "contact.egg.torque.Z"
     assert ours.forces[name] == pytest.approx(theirs.forces[name], abs=1e-3)
+
+
+def test_what_is_computed_in_python_has_no_derivatives(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    model, surfaces = chain(), meshes(tmp_path)
+    force = touching(surfaces)
+    force.name = "push"
+    model.add(*surfaces, force)
+    with pytest.raises(UnsupportedError, match="/forceset/push' is computed in Python"):
+        osimlite.tangents(model)
+    made = plan(model, {"/bodyset/b1/mass": (1.0, 3.0)}, measures=("energy",), to=0.01)
+    with pytest.raises(UnsupportedError, match="/forceset/push' is computed in Python"):
+        registry.gradients(made).at([2.0], [0])
