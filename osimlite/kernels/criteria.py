@@ -82,10 +82,7 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
             noted[NOTED.START] = noted[NOTED.HERE] = row[centre]
 
 
-def judged(
-    senses: Ints, known: Floats, i: Ints, p: Floats, t: float, row: Floats, active: Ints, y: Floats, u: Floats,
-    room: Floats,
-) -> bool:  # fmt: skip
+def judged(senses: Ints, known: Floats, i: Ints, p: Floats, t: float, row: Floats, u: Floats, room: Floats) -> bool:
     """Note a row, and tell whether the walker has fallen, or its jump has ended.
 
     Args:
@@ -95,8 +92,6 @@ def judged(
         p: their numbers.
         t: time, s.
         row: what is felt.
-        active: where the state has the activations.
-        y: the state.
         u: the excitations that were held.
         room: of the criteria.
     """
@@ -115,9 +110,9 @@ def judged(
             has_fallen = has_fallen or noted[JUMP_NOTED.ENDED] > 0.0
             continue
         if own[CRITERION.KIND] == WANG:
-            value = wang(senses, known, numbers, row, active, y, u)
+            value = wang(senses, known, numbers, row, u)
         elif own[CRITERION.KIND] >= POWERS:
-            value = effort(senses, known, own[CRITERION.KIND], own[CRITERION.PLACE], row, active, y)
+            value = effort(senses, known, own[CRITERION.KIND], own[CRITERION.PLACE], row)
         else:
             value = penalty(senses, own[CRITERION.KIND], own[CRITERION.PLACE], numbers, row)
         noted[NOTED.HERE] = row[senses[SENSES.CENTRE]]
@@ -193,7 +188,7 @@ def penalty(senses: Ints, kind: int, place: int, numbers: Floats, row: Floats) -
     return numbers[CRITERION_NUMBERS.LINEAR] * off + numbers[CRITERION_NUMBERS.SQUARED] * (off * off)
 
 
-def effort(senses: Ints, known: Floats, kind: int, power: int, row: Floats, active: Ints, y: Floats) -> float:
+def effort(senses: Ints, known: Floats, kind: int, power: int, row: Floats) -> float:
     """The sum of the activations to a power, or 1 more than that of the tensions (N)."""
     count, total = senses[SENSES.MUSCLES], 1.0 if kind == TENSIONS else 0.0
     strengths = at(known, SENSED.HEAD + count)
@@ -203,19 +198,18 @@ def effort(senses: Ints, known: Floats, kind: int, power: int, row: Floats, acti
             each = row[senses[SENSES.FORCES] + k] * strengths[k]
         else:
             for _ in range(power):
-                each *= y[active[k]]
+                each *= row[senses[SENSES.ACTIVATIONS] + k]
         total += each
     return total
 
 
-def wang(
-    senses: Ints, known: Floats, numbers: Floats, row: Floats, active: Ints, y: Floats, excitations: Floats
-) -> float:
+def wang(senses: Ints, known: Floats, numbers: Floats, row: Floats, excitations: Floats) -> float:
     """Power, W (J. M. Wang et al., ACM Trans. Graph. 31, 2012, after F. C. Anderson's thesis of 1999)."""
     count, slow, total = senses[SENSES.MUSCLES], numbers[CRITERION_NUMBERS.SLOW], 0.0
     optimal, strengths = at(known, SENSED.HEAD), at(known, SENSED.HEAD + count)
     for k in range(count):
-        u, a, n = QUARTER * excitations[k], QUARTER * y[active[k]], row[senses[SENSES.LENGTHS] + k]
+        u, a = QUARTER * excitations[k], QUARTER * row[senses[SENSES.ACTIVATIONS] + k]
+        n = row[senses[SENSES.LENGTHS] + k]
         of_activation = 40.0 * slow * sin(u) + 133.0 * (1.0 - slow) * (1.0 - cos(u))
         of_maintenance = 74.0 * slow * sin(a) + 111.0 * (1.0 - slow) * (1.0 - cos(a))
         shape = 0.5 if n < 0.5 else n if n < 1.0 else 3.0 - 2.0 * n if n < 1.5 else 0.0

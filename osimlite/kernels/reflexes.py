@@ -1,8 +1,9 @@
 """Reflexes: sums of terms ``gain * (sensor - offset)`` with a delay, each on while a leg is in some states.
 
-The integers are a head, `REFLEXES`; of each term `TERM`; of each gate the sensors of a coordinate and of its speed. The
-numbers of a candidate are a head, `LIMITS`, in which each leg has its own; of each term delay, gain and offset; of each
-gate delay, least and largest value. Delays are in control steps. A term without a sensor is ``gain * (t -
+The integers are a head, `REFLEXES`; of each term `TERM`; of each gate the sensors of a coordinate and of its speed; of
+each sensor what it feels, `senses.SOURCE`. The numbers of a candidate are a head, `LIMITS`, in which each leg has its
+own; of each term delay, gain and offset; of each gate delay, least and largest value; those of sources. Where legs have
+states the first two sensors feel their loads. Delays are in control steps. A term without a sensor is ``gain * (t -
 delay)**power`` from its delay on, with the time t in control steps.
 
 Noise is drawn anew at each control step, from a seed, the number of the step and that of what is noisy alone.
@@ -14,8 +15,7 @@ from math import cos, floor, log, pi, sqrt
 
 from osimlite.kernels.layout import Record
 from osimlite.kernels.pointers import Floats, Ints, at
-from osimlite.kernels.senses import SENSES, ahead
-from osimlite.kernels.states import copy
+from osimlite.kernels.senses import SOURCE, ahead, felt
 
 EARLY_STANCE, LATE_STANCE, LIFTOFF, SWING, LANDING = range(5)
 """States of a leg."""
@@ -59,11 +59,13 @@ class LIMITS(metaclass=Record):
     CONTROL_NOISE, CONTROL_PART, SENSOR_NOISE, SENSOR_PART, HEAD = range(SEED + 1, SEED + 6)
 
 
-def note_senses(i: Ints, p: Floats, frames: int, row: Floats, history: Floats) -> None:
+def note_senses(s: Ints, w: Floats, i: Ints, p: Floats, frames: int, row: Floats, history: Floats) -> None:
     """Remember what is felt after so many rows."""
     sensors = i[REFLEXES.SENSORS]
     kept = at(history, sensors * (frames % i[REFLEXES.KEPT]))
-    copy(sensors, row, kept)
+    sources = at(i, REFLEXES.HEAD + TERM.SIZE * i[REFLEXES.TERMS] + OF_GATE * i[REFLEXES.GATES])
+    for k in range(sensors):
+        kept[k] = felt(s, w, at(sources, SOURCE.SIZE * k), p, row)
     if i[REFLEXES.IS_NOISY] > 0:
         for k in range(sensors):
             width = p[LIMITS.SENSOR_NOISE] + p[LIMITS.SENSOR_PART] * abs(kept[k])
@@ -94,8 +96,7 @@ def felt_before(i: Ints, frames: int, history: Floats, sensor: int, delay: float
 
 def go_on(senses: Ints, i: Ints, p: Floats, frames: int, row: Floats, history: Floats, legs: Floats) -> None:
     """The states of two legs after a control step."""
-    loads = senses[SENSES.LOADS]
-    one, two = felt_before(i, frames, history, loads, p[0]), felt_before(i, frames, history, loads + 1, p[0])
+    one, two = felt_before(i, frames, history, 0, p[0]), felt_before(i, frames, history, 1, p[0])
     first, second = ahead(senses, row, 0), ahead(senses, row, 1)
     of_one, of_two, is_direct = at(p, 1), at(p, 1 + LIMITS.OF_LEG), i[REFLEXES.SWINGS_FROM_STANCE] > 0
     states = int(legs[0]), int(legs[1])

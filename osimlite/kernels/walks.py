@@ -41,7 +41,7 @@ class Walk(NamedTuple):
     m: Motion
     senses: Ints  # see `senses`
     known: Floats
-    driven: Ints  # where the numbers of the model have each control (c,); where a state has each activation (m,)
+    driven: Ints  # where the numbers of the model have each control (c,)
     plan: Ints  # see `reflexes`
     numbers: Floats
     criteria: Ints  # see `criteria`
@@ -170,7 +170,7 @@ def begun(a: Walk, y: Floats, order: int) -> int:
         for k in range(LEGS):
             a.room[k] = UNKNOWN if a.plan[REFLEXES.HAS_STATES] > 0 else EARLY_STANCE
         a.progress[STEPS], a.progress[FRAMES], a.progress[GOING], a.progress[FORCES] = 0, 1, 1, 0
-        note_senses(a.plan, a.numbers, 0, a.row, at(a.room, LEGS))
+        note_senses(m.s, m.w, a.plan, a.numbers, 0, a.row, at(a.room, LEGS))
         excite(a)
     elif order == START:
         begin_criteria(a.senses, a.criteria, a.row, judged_room(a))
@@ -209,13 +209,10 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
             # The method has not looked at the forces at the end.
             evaluated(m, m.clock[0], y, at(m.w, m.s[MODEL.WORK_STATE]), STAGE.FORCE)
         feel(m.s, m.w, y, a.senses, a.known, a.row)
-        note_senses(a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
+        note_senses(m.s, m.w, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
         progress[FRAMES] += 1
         t = progress[STEPS] * a.known[SENSED.STEP]
-        active = at(a.driven, controls)
-        if judged(
-            a.senses, a.known, a.criteria, a.bounds, t, a.row, active, y, a.excitations, judged_room(a)
-        ):  # fmt: skip
+        if judged(a.senses, a.known, a.criteria, a.bounds, t, a.row, a.excitations, judged_room(a)):
             progress[GOING] = 0
 
 
@@ -336,7 +333,7 @@ def decide(a: Walk, y: Floats) -> bool:
     if evaluated(m, m.clock[0], y, at(m.w, m.s[MODEL.WORK_STATE]), STAGE.FORCE) != OUTCOME.OK:
         return False
     feel(m.s, m.w, y, a.senses, a.known, a.row)
-    note_senses(a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
+    note_senses(m.s, m.w, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
     progress[FRAMES] += 1
     excite(a)
     row = progress[STEPS] - a.plan[REFLEXES.FIRST]

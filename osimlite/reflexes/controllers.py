@@ -14,12 +14,12 @@ import numpy as np
 
 from osimlite.kernels.pointers import Ints
 from osimlite.kernels.reflexes import FREE, LIMITS, OF_RESULT, OF_SENSOR, REFLEXES, TERM
-from osimlite.kernels.senses import SENSES
 from osimlite.kernels.walks import LEGS
 from osimlite.multibody.spatial import Array
 from osimlite.quantity import tell
 from osimlite.reflexes.parameters import Parameters
 from osimlite.reflexes.settings import Node, matches
+from osimlite.reflexes.sources import KINDS, SPEED, VALUE, Kind, Source, load
 from osimlite.reflexes.walkers import SIDES, Felt
 from osimlite.text import listed, or_known
 
@@ -27,8 +27,8 @@ STATES = "EarlyStance", "LateStance", "Liftoff", "Swing", "Landing"
 COMPOSITE, FEED_FORWARD, NOISE = "CompositeController", "FeedForwardController", "NoiseController"
 CONTROLLERS = "GaitStateController", "ReflexController", FEED_FORWARD, COMPOSITE
 """What is done here, and besides noise within a CompositeController."""
-KINDS = "MuscleReflex", "ConditionalMuscleReflex", "DofReflex"
-"""Of reflexes."""
+CONDITIONAL, OTHER = "ConditionalMuscleReflex", "_o"
+"""A kind of reflexes that have a gate; the end of names of what is on the other side."""
 NEVER = -1.0
 """A threshold that has no effect."""
 LARGEST_SEED = 10**15
@@ -110,6 +110,7 @@ class Reflexes:
 
     Attributes:
         terms: of all reflexes.
+        sources: what they feel, and the numbers of the sensors for it.
 
     Raises:
         DocumentError: it has a part that is not done here; its name and line are told.
@@ -118,6 +119,7 @@ class Reflexes:
     def __init__(self, node: Node, kind: str, walkers: Felt, parameters: Parameters) -> None:
         self.walkers = walkers
         self.terms: list[Part] = []
+        self.sources: dict[Source, int] = {}
         self._gates: list[Part] = []
         self._limits, self._swings_from_stance = np.zeros((walkers.count, LIMITS.HEAD)), False
         self._has_states = self._is_noisy = False
@@ -125,6 +127,10 @@ class Reflexes:
         if kind == COMPOSITE:
             parts = [*node.all_of(*CONTROLLERS[:-1]), *node.all_of(NOISE)]
             node.expect_all_asked(f"a {COMPOSITE}", (*CONTROLLERS[:-1], NOISE))
+        if any(name == "GaitStateController" for name, _ in parts):
+            walkers.expect_legs()
+            for leg in range(len(SIDES)):
+                self._sensor(load(walkers, leg))
         for name, part in parts:
             if name == NOISE:
                 self._read_noise(part)
@@ -138,7 +144,6 @@ class Reflexes:
                 raise part.error("legs are in the states of one GaitStateController, and this is another one")
             else:
                 self._has_states = self._is_sided = True
-                walkers.expect_legs()
                 self._read_states(part, parameters)
 
     def _read_noise(self, node: Node) -> None:
@@ -226,41 +231,43 @@ class Reflexes:
         blocks = [node, *(block for _, block in node.all_of("Reflexes"))]
         for block in blocks:
             for kind, reflex in block.all_of(*KINDS):
-                make = self._coordinate_reflex if kind == "DofReflex" else self._muscle_reflex
-                make(reflex, parameters, prefix, leg, states, symmetric)
-                reflex.expect_all_asked(f"a {kind}")
-            block.expect_all_asked("a ReflexController")
+                self._add_reflex(kind, reflex, parameters, prefix, leg, states, symmetric)
+            block.expect_all_asked("a ReflexController", tuple(KINDS))
         if not any(kind in KINDS for block in blocks for kind, _ in block.parts):
             raise node.error("a ReflexController needs reflexes")
 
     def _named(self, node: Node, name: str, names: list[str], leg: int) -> int:
-        """The number of what has a name, with or without the side of a leg."""
-        for full in (name, name + SIDES[leg]) if self._is_sided else (name,):
+        """The number of what has a name, with or without the side of a leg; `_o` is the other one."""
+        own = name[:-2] + SIDES[1 - leg] if self._is_sided and name.endswith(OTHER) else name
+        for full in (own, own + SIDES[leg]) if self._is_sided else (own,):
             if full in names:
                 return names.index(full)
-        beside = f" or '{name}{SIDES[leg]}'" if self._is_sided else ""
-        raise node.error(f"the model has no '{name}'{beside}{or_known(name, names)}")
+        beside = f" or '{own}{SIDES[leg]}'" if self._is_sided else ""
+        raise node.error(f"the model has no '{own}'{beside}{or_known(own, names)}")
 
-    def _begin(self, node: Node, prefix: str, leg: int, symmetric: bool) -> tuple[int, str, str]:
-        """Target, name of the source, and what stands before the names of parameters."""
-        for key in ("min_control_value", "max_control_value", "condition", "filter_cutoff_frequency", "P0_source"):
+    def _begin(self, node: Node, prefix: str, leg: int, symmetric: bool, kind: Kind) -> tuple[int, int, str]:
+        """Numbers of the target and of the source, and what stands before the names of parameters."""
+        for key in ("min_control_value", "max_control_value", *kind.refused):
             if node.get(key) is not None:
                 raise node.error(f"'{key}' of reflexes is not done here")
         target = node.text("target")
-        source = node.text("source", target)
+        source = node.text("source", target if kind.is_own else None)
 
         def named(name: str) -> str:
-            bare = name[:-2] if name.endswith(SIDES) else name
+            bare = name[:-2] if name.endswith((*SIDES, OTHER)) else name
             if not self._is_sided:
                 return name
             if not symmetric:
-                return name if name.endswith(SIDES) or bare in self.walkers.coordinates else bare + SIDES[leg]
-            return f"{bare}_o" if name.endswith(SIDES) and not name.endswith(SIDES[leg]) else bare
+                if name.endswith(SIDES) or bare in self.walkers.coordinates:
+                    return name
+                return bare + SIDES[1 - leg if name.endswith(OTHER) else leg]
+            return f"{bare}{OTHER}" if name != bare and not name.endswith(SIDES[leg]) else bare
 
         first, second = named(target), named(source)
         own = node.text("par_name", "")
         name = named(own) if own else first if first == second else f"{first}-{second}"
-        return self._named(node, target, self.walkers.names, leg), source, f"{prefix}{name}."
+        number = self._named(node, target, self.walkers.names, leg)
+        return number, self._named(node, source, kind.names(self.walkers), leg), f"{prefix}{name}."
 
     @staticmethod
     def _delay(node: Node, parameters: Parameters, before: str) -> Array:
@@ -269,22 +276,35 @@ class Reflexes:
             raise node.error(f"a delay of {delay.min():g} s knows what is to come")
         return delay
 
-    def _muscle_reflex(
-        self, node: Node, parameters: Parameters, prefix: str, leg: int, states: int, symmetric: bool
+    def _sensor(self, source: Source) -> int:
+        """The number of the sensor that feels something."""
+        return self.sources.setdefault(source, len(self.sources))
+
+    def _add_reflex(
+        self, name: str, node: Node, parameters: Parameters, prefix: str, leg: int, states: int, symmetric: bool
     ) -> None:
-        target, source, before = self._begin(node, prefix, leg, symmetric)
-        number = self._named(node, source, self.walkers.names[: len(self.walkers.muscles)], leg)
+        kind = KINDS[name]
+        node.asked.update(kind.settings)
+        target, number, before = self._begin(node, prefix, leg, symmetric, kind)
         delay = self._delay(node, parameters, before)
-        gate = self._gate(node, parameters, before, leg)
-        for kind, rest, negative in (("L", 1.0, True), ("V", 0.0, False), ("F", 0.0, True)):
-            gain = parameters.of(node, f"K{kind}", 0.0, f"{before}K{kind}")
-            offset = parameters.of(node, f"{kind}0", rest, f"{before}{kind}0")
-            free = node.flag(f"allow_neg_{kind}", negative)
-            if np.any(gain != 0.0):
-                sensor = self.walkers.sensor(kind, number)
-                term = target, sensor, FREE if free else OF_SENSOR, leg, states, gate
-                self.terms.append(Part(term, delay, gain, offset))
-        self._constant(node, parameters, before, target, leg, states)
+        gate = self._gate(node, parameters, before, leg) if name == CONDITIONAL else -1
+        for letter, feel, rest, is_free in kind.channels:
+            settings = (f"{letter}0", rest), (f"K{letter}", 0.0)
+            found = {
+                key: parameters.of(node, key, value, before + key)
+                for key, value in (settings if kind.corrects else settings[::-1])
+            }
+            gain, free = found[f"K{letter}"], is_free is None or node.flag(f"allow_neg_{letter}", is_free)
+            if np.any(gain != 0.0) or f"{before}K{letter}" in parameters.found:
+                source = feel(self.walkers, node, number, SIDES[leg] if self._is_sided else "")
+                held = FREE if free else OF_RESULT if kind.corrects else OF_SENSOR
+                term = target, self._sensor(source), held, leg, states, gate
+                self.terms.append(Part(term, delay, -gain if kind.corrects else gain, found[f"{letter}0"]))
+        constant = parameters.of(node, "C0", 0.0, f"{before}C0")
+        if np.any(constant != 0.0) or f"{before}C0" in parameters.found:
+            zero = np.zeros_like(constant)
+            self.terms.append(Part((target, -1, FREE, leg, states, -1), zero, constant, zero))
+        node.expect_all_asked(f"a {name}")
 
     def _gate(self, node: Node, parameters: Parameters, before: str, leg: int) -> int:
         """The number of the range of a ConditionalMuscleReflex."""
@@ -297,36 +317,9 @@ class Reflexes:
         low, high = (
             parameters.of(node, f"pos_{end}", way, f"{start}pos_{end}") for end, way in (("min", -1e12), ("max", 1e12))
         )
-        value, speed = (self.walkers.sensor(kind, number) for kind in ("DP", "DV"))
+        value, speed = (self._sensor(feel(self.walkers, node, number, "")) for feel in (VALUE, SPEED))
         self._gates.append(Part((value, speed), delay, low, high))
         return len(self._gates) - 1
-
-    def _coordinate_reflex(
-        self, node: Node, parameters: Parameters, prefix: str, leg: int, states: int, symmetric: bool
-    ) -> None:
-        target, source, before = self._begin(node, prefix, leg, symmetric)
-        if node.get("source") is None:
-            raise node.error("'source', a coordinate, is missing")
-        number = self._named(node, source, self.walkers.coordinates, leg)
-        for key in ("source_parent", "mirror_left", "KA"):
-            if node.get(key) is not None:
-                raise node.error(f"'{key}' of a DofReflex is not done here")
-        delay = self._delay(node, parameters, before)
-        for kind, sensor in (("P", "DP"), ("V", "DV")):
-            offset = parameters.of(node, f"{kind}0", 0.0, f"{before}{kind}0")
-            gain = parameters.of(node, f"K{kind}", 0.0, f"{before}K{kind}")
-            free = node.flag(f"allow_neg_{kind}", True)
-            if np.any(gain != 0.0):
-                place = self.walkers.sensor(sensor, number)
-                term = target, place, FREE if free else OF_RESULT, leg, states, -1
-                self.terms.append(Part(term, delay, -gain, offset))
-        self._constant(node, parameters, before, target, leg, states)
-
-    def _constant(self, node: Node, parameters: Parameters, before: str, target: int, leg: int, states: int) -> None:
-        constant = parameters.of(node, "C0", 0.0, f"{before}C0")
-        if np.any(constant != 0.0):
-            zero = np.zeros_like(constant)
-            self.terms.append(Part((target, -1, FREE, leg, states, -1), zero, constant, zero))
 
     def compiled(self) -> tuple[Ints, Array]:
         """What the kernels go by (see :mod:`osimlite.kernels.reflexes`): integers, and of each candidate the
@@ -338,12 +331,14 @@ class Reflexes:
         numbers = np.column_stack([self._limits, *(column for columns in each for column in columns)])
         felt = (np.max(delay) for part, delay in zip(parts, delays, strict=True) if part.ints[TERM.SENSOR] >= 0)
         kept = int(np.ceil(max([*felt, self._limits[0, LIMITS.DELAY]]))) + 2
-        sensors = int(self.walkers.senses[SENSES.ACTIVE])
-        head = np.zeros(REFLEXES.HEAD, dtype=np.int64)
+        ints = [number for part in parts for number in part.ints]
+        for source in self.sources:
+            ints += source.kind, source.place, numbers.shape[1] if source.numbers else source.more
+            numbers = np.column_stack([numbers, *(np.full(len(numbers), x) for x in source.numbers)])
+        head, sensors = np.zeros(REFLEXES.HEAD, dtype=np.int64), len(self.sources)
         head[: REFLEXES.ROOM + 1] = (
             *(len(self.terms), len(self._gates), kept, sensors, self._has_states, self._swings_from_stance),
             *(numbers.shape[1], LEGS + kept * sensors),
         )
         head[REFLEXES.IS_NOISY] = self._is_noisy
-        ints = [*head.tolist(), *(number for part in parts for number in part.ints)]
-        return np.array(ints, dtype=np.int64), np.ascontiguousarray(numbers)
+        return np.array([*head, *ints], dtype=np.int64), np.ascontiguousarray(numbers)

@@ -93,4 +93,12 @@ class Feedback:
         others = np.setdiff1d(everything, everything if is_noisy else targets)
         first, known = SENSED.HEAD + 2 * len(felt.muscles), felt.known.copy()
         known[first + others] = known[first + len(felt.names) + others] = 0.0
-        return Held(tuple(felt.paths), self.step, tuple(felt.sensors()), felt.senses, known, plan, numbers)
+        return Held(
+            tuple(felt.paths),
+            self.step,
+            tuple(source.name for source in reflexes.sources),
+            felt.senses,
+            known,
+            plan,
+            numbers,
+        )

@@ -11,8 +11,11 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from osimlite.document.data import SUFFIXES, parsed_yaml
 from osimlite.errors import DocumentError, MissingFileError
+from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass, field
 from osimlite.text import did_you_mean
 
@@ -93,6 +96,19 @@ class Node:
         if text.lower() not in FLAGS:
             raise (self.get(key) or self).error(f"'{key}' must be 0 or 1, not '{text}'")
         return FLAGS[text.lower()]
+
+    def vector(self, key: str, otherwise: str | None = None) -> Array:
+        """The three numbers that a part is.
+
+        Raises:
+            DocumentError: it is something else.
+        """
+        text = self.text(key, otherwise)
+        try:
+            x, y, z = map(float, text.split())
+        except ValueError:
+            raise (self.get(key) or self).error(f"'{key}' must be three numbers, as [ 0 0 1 ], not '{text}'") from None
+        return np.array([x, y, z])
 
     def all_of(self, *names: str) -> Iterator[tuple[str, Node]]:
         """The parts of some names, in their order."""

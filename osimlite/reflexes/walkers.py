@@ -25,10 +25,6 @@ from osimlite.text import did_you_mean, listed
 
 SIDES = "_l", "_r"
 """Ends of names, left before right, which is the order of the legs."""
-SENSORS = {
-    "L": SENSES.LENGTHS, "V": SENSES.VELOCITIES, "F": SENSES.FORCES, "DP": SENSES.VALUES, "DV": SENSES.SPEEDS,
-}  # fmt: skip
-"""What reflexes call it."""
 
 
 class Leg(NamedTuple):
@@ -125,25 +121,13 @@ class Felt:
             masses,
         )
         known = np.concatenate(own)
-        sizes = m, m, m, n, n, legs, m, n, 3 * b, 3, 1
+        sizes = m, m, m, m, m, n, n, n, legs, 3 * b, 3, 1
         head = m, n, legs, len(limits) // 2, b, len(self.names), len(known)
         plan = [*head, 0, *np.cumsum(sizes).tolist()]
         plan += [place for path in self.paths[:m] for place in engine.places_of(path, OF_MUSCLES)] + limits
         plan += [placement.link for placement in engine.placements]
         plan += [number for leg in self.legs for number in (leg.base, leg.foot, leg.pairs.start, leg.pairs.stop)]
         return np.array(plan, dtype=np.int64), known
-
-    def sensor(self, kind: str, number: int) -> int:
-        """Where a row has the length (L), velocity (V) or force (F) of a muscle, or the value (DP) or speed (DV) of a
-        coordinate."""
-        return int(self.senses[SENSORS[kind]]) + number
-
-    def sensors(self) -> list[str]:
-        """What reflexes may go by, in the order of a row."""
-        muscles = [path.removeprefix("/") for path in self.paths[: len(self.muscles)]]
-        named = [f"{name}.{what}" for what in ("length", "velocity", "force") for name in muscles]
-        named += [f"{name}.{what}" for what in ("value", "speed") for name in self.coordinates]
-        return named + [f"leg{leg.side}.load" for leg in self.legs]
 
     def _legs(self, upper: str, lower: str, contact: str) -> list[Leg]:
         names = [body.name for body in self.mechanism.bodies]
@@ -240,10 +224,10 @@ class Walkers(Felt):
             **{f"{infos[k].path}/speed": size + n for n, k in enumerate(state.order)},
             **{path: 2 * size + n for n, path in enumerate(state.paths)},
         }
-        self.activations = np.array([self.places[f"{path}/activation"] for path in self.paths])
+        self._activations = np.array([self.places[f"{path}/activation"] for path in self.paths])
         self.rows, self.excitations = np.zeros((count, self.senses[SENSES.SIZE])), np.zeros((count, len(self.names)))
         self.progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
-        self._driven: Ints = np.concatenate([self.copies.places[self.order], self.activations])
+        self._driven: Ints = self.copies.places[self.order]
 
     # ------------------------------------------------------------------------------------------------- walking
     def go_by(self, plan: Ints, numbers: Array, criteria: Ints, bounds: Array, room: int) -> None:
@@ -282,13 +266,13 @@ class Walkers(Felt):
 
     def loads(self) -> Array:
         """Forces of the ground on the legs over the weight, as they were felt last (w, l)."""
-        return self.rows[:, self.senses[SENSES.LOADS] : self.senses[SENSES.ACTIVE]]
+        return self.rows[:, self.senses[SENSES.LOADS] : self.senses[SENSES.PLACES]]
 
     def equilibrated(self, activations: Array) -> None:
         """Have muscles be in equilibrium with activations (w, m)."""
         for k in range(self.count):
             state = self.copies.states[k].copy()
-            state[self.activations] = activations[k]
+            state[self._activations] = activations[k]
             self.copies.states[k] = self.engine.equilibrated(0.0, state.tolist())
 
     def close(self) -> None:

@@ -189,7 +189,7 @@ def test_yaml_and_data_of_python_say_the_same_as_a_scenario(arm, tmp_path) -> No
         ("max_duration = 1", "max_duration = 0", "max_duration is to be positive"),
         ("~2<0,20>", "~30<0,20>", "'flexor-elbow.KP' begins at 30, which is not from 0 to 20"),
         ("~2<0,20>", "~2<20,0>", "begins at 2, which is not from 20 to 0"),
-        ("source = elbow P0 = 1.2 KP = ~2", "P0 = 1.2 KP = ~2", "'source', a coordinate, is missing"),
+        ("source = elbow P0 = 1.2 KP = ~2", "P0 = 1.2 KP = ~2", "'source' is missing"),
         ("dual_sided = 0", "dual_sided = 0 symetric = 1", "'symetric' of a ReflexController is not done here"),
     ],
 )
