@@ -31,7 +31,6 @@ def shown_in_notebooks(by: str) -> Callable[[Any], str]:
     """
 
     def _repr_html_(self: Any) -> str:
-        said: str = getattr(import_module("osimlite.view.notebook"), by)(self)
-        return said
+        return getattr(import_module("osimlite.view.notebook"), by)(self)
 
     return _repr_html_

@@ -58,8 +58,7 @@ def app(names: Sequence[str] = COMMANDS) -> Typer:
 
 def _loaded(name: str) -> Command:
     function = name.replace("-", "_")
-    command: Command = getattr(import_module(f"osimlite.cli.{function}"), function)
-    return command
+    return getattr(import_module(f"osimlite.cli.{function}"), function)
 
 
 def _tell_version() -> None:

@@ -178,8 +178,7 @@ class Command:
 
 def _names(function: Any) -> tuple[str, ...]:
     code = function.__code__
-    names: tuple[str, ...] = code.co_varnames[: code.co_argcount]
-    return names
+    return code.co_varnames[: code.co_argcount]
 
 
 def _declared(choice: Choice) -> Declared:

@@ -75,10 +75,7 @@ def to_json(model: Model) -> str:
 
 def to_yaml(model: Model) -> str:
     """The model as YAML; MissingDependency if PyYAML is not installed."""
-    dumped: str = _yaml().safe_dump(
-        to_data(model), sort_keys=False, default_flow_style=None, allow_unicode=True, width=120
-    )
-    return dumped
+    return _yaml().safe_dump(to_data(model), sort_keys=False, default_flow_style=None, allow_unicode=True, width=120)
 
 
 def to_data(model: Model) -> dict[str, Any]:

@@ -245,8 +245,7 @@ class ObjectReader:
         """Read the object of a property, from another file if a ``file`` attribute says so."""
         file = element.get("file") if self.included is not None else None
         if not file or self.included is None:
-            plain: Object = self.object(element, cls, name)
-            return plain
+            return self.object(element, cls, name)
         result, number, known = self.included(str(file), cls), self.count, len(self.notes)
         if isinstance(result, str):
             empty: Object = self.object(element, cls, name)

@@ -140,8 +140,7 @@ def _forwards(model: Model, mechanism: Mechanism, rotations: Array) -> Array:
             for socket in ("socket_parent_frame", "socket_child_frame")
         ]
         if ends[0] == GROUND:
-            forwards: Array = rotations[ends[1]][:, 0]
-            return forwards
+            return rotations[ends[1]][:, 0]
     raise SettingError(f"no joint of '{model.name}' begins at ground; leave out base_imu_label")
 
 

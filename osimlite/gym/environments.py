@@ -228,8 +228,7 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
     def _begun(self, k: int) -> Array:
         """The state in which a copy begins anew."""
         self._all.begin(k, self._random[k])
-        state: Array = self._all.copies.states[k].copy()
-        return state
+        return self._all.copies.states[k].copy()
 
     def render(self) -> Any:
         """The poses of all copies as images; None without a mode."""

@@ -100,8 +100,7 @@ def _shaken(scale: float) -> Callable[[Array, tuple[str, ...], np.random.Generat
 
 
 def _effort(seen: Seen) -> Array:
-    result: Array = np.mean(seen.controls**2, axis=1)
-    return result
+    return np.mean(seen.controls**2, axis=1)
 
 
 def walk2d() -> Task:
@@ -109,12 +108,10 @@ def walk2d() -> Task:
 
     def reward(before: Seen, after: Seen) -> Array:
         speed = (after["pelvis_tx"] - before["pelvis_tx"]) / after.step
-        result: Array = np.exp(-4.0 * (speed - 1.2) ** 2) + 0.2 - 0.1 * _effort(after)
-        return result
+        return np.exp(-4.0 * (speed - 1.2) ** 2) + 0.2 - 0.1 * _effort(after)
 
     def is_over(seen: Seen) -> NDArray[np.bool_]:
-        result: NDArray[np.bool_] = (seen["pelvis_ty"] < 0.7) | (np.abs(seen["pelvis_tilt"]) > 0.8)
-        return result
+        return (seen["pelvis_ty"] < 0.7) | (np.abs(seen["pelvis_tilt"]) > 0.8)
 
     return Task(_human, reward, is_over, hidden=("pelvis_tx",), start=_shaken(0.01), integrator=CONTACT)
 
@@ -126,8 +123,7 @@ def jump() -> Task:
         return 10.0 * (after["pelvis_ty"] - before["pelvis_ty"]) - 0.01 * _effort(after)
 
     def is_over(seen: Seen) -> NDArray[np.bool_]:
-        result: NDArray[np.bool_] = (seen["pelvis_ty"] < 0.4) | (np.abs(seen["pelvis_tilt"]) > 1.5)
-        return result
+        return (seen["pelvis_ty"] < 0.4) | (np.abs(seen["pelvis_tilt"]) > 1.5)
 
     return Task(
         lambda: jumper(driven=False), reward, is_over, hidden=("pelvis_tx",), start=_shaken(0.002), seconds=1.0,
@@ -170,12 +166,10 @@ def arm() -> Task:
     """A forearm with a weight that is to be held up at 1.2 rad."""
 
     def reward(before: Seen, after: Seen) -> Array:
-        result: Array = np.exp(-10.0 * (after["elbow"] - WANTED) ** 2) - 0.05 * _effort(after)
-        return result
+        return np.exp(-10.0 * (after["elbow"] - WANTED) ** 2) - 0.05 * _effort(after)
 
     def is_over(seen: Seen) -> NDArray[np.bool_]:
-        result: NDArray[np.bool_] = np.abs(seen["elbow"]) > 3.0
-        return result
+        return np.abs(seen["elbow"]) > 3.0
 
     return Task(_arm_model, reward, is_over, start=_shaken(0.1), seconds=2.0)
 

@@ -100,8 +100,7 @@ def _narrowed(paths: Paths, suspects: Sequence[Suspect]) -> list[float]:
         moves = active & ~is_before
         low, before = np.where(moves, middle, low), np.where(moves, here, before)
         active = high - low > ASIDE
-    result: list[float] = np.where([item.excess < inf for item in suspects], 0.5 * (low + high), low).tolist()
-    return result
+    return np.where([item.excess < inf for item in suspects], 0.5 * (low + high), low).tolist()
 
 
 def _beside(suspect: Suspect, value: float) -> Array:

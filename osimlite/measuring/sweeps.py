@@ -38,14 +38,12 @@ class Sweep:
     @property
     def values(self) -> Array:
         """Values (k,) of the coordinate, rad or m."""
-        values: Array = self.poses[:, self.place]
-        return values
+        return self.poses[:, self.place]
 
     @property
     def moved(self) -> NDArray[np.bool_]:
         """Whether the length of each path (p,) changes."""
-        changes: NDArray[np.bool_] = np.nan_to_num(np.ptp(self.lengths, axis=0)) > STILL
-        return changes
+        return np.nan_to_num(np.ptp(self.lengths, axis=0)) > STILL
 
     @property
     def info(self) -> CoordinateInfo:
@@ -69,8 +67,7 @@ class Sweep:
         """
         before, after = self.poses[place], self.poses[place + 1]
         part = (values - before[:, self.place]) / (after[:, self.place] - before[:, self.place])
-        between: Array = before + part[:, None] * (after - before)
-        return between
+        return before + part[:, None] * (after - before)
 
     def before(self, values: Array) -> NDArray[np.intp]:
         """Numbers (k,) of the poses before values of the coordinate."""
@@ -130,5 +127,4 @@ def tied(paths: Paths, start: Array) -> Array:
         return np.zeros(len(start), dtype=bool)
     state = paths.mechanism.at(start)
     rows, _ = stacked([item.velocity_equations(state) for item in constraints])
-    result: Array = np.abs(rows).max(axis=0) > 0.0
-    return result
+    return np.abs(rows).max(axis=0) > 0.0

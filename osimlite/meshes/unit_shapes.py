@@ -109,5 +109,4 @@ def normals_of(surface: Surface) -> Array:
     for index in range(3):
         np.add.at(total, surface.triangles[:, index], areas)
     lengths = np.linalg.norm(total, axis=1, keepdims=True)
-    result: Array = total / np.where(lengths > 0.0, lengths, 1.0)
-    return result
+    return total / np.where(lengths > 0.0, lengths, 1.0)

@@ -53,8 +53,7 @@ def write_beside(source: str, model: Model, file: Path) -> list[Path]:
     if source not in STUDIES:
         return []
     place, _, name = STUDIES[source].partition(":")
-    files: list[Path] = getattr(module_named(place), name)(model, file)
-    return files
+    return getattr(module_named(place), name)(model, file)
 
 
 def parameters_of(source: str) -> dict[str, Any]:

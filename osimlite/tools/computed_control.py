@@ -268,8 +268,7 @@ class ComputedControl:
         if not self.has_states:
             return controls * self.sharing.optimal
         moment = [target, *self._posed(target, self._aged(t, target, z, controls))]
-        forces: Array = self.engine.looked(np.array([moment]), self._places, STAGE.FORCE)[0]
-        return forces
+        return self.engine.looked(np.array([moment]), self._places, STAGE.FORCE)[0]
 
     def _posed(self, t: float, z: Array) -> list[float]:
         """The state (y,) on the way that is foreseen."""

@@ -178,8 +178,7 @@ def _one(places: dict[Path, Path | None], kept: dict[str | Path, Outcome] | None
 
 
 def _plain(summary: dict[str, Any]) -> dict[str, Any]:
-    plain: dict[str, Any] = json.loads(json.dumps(summary, default=float))
-    return plain
+    return json.loads(json.dumps(summary, default=float))
 
 
 def digest_of(setup: Path) -> str:

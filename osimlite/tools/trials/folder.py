@@ -86,8 +86,7 @@ class Folder:
         """What is needed several times, made once."""
         if key not in self._kept:
             self._kept[key] = make()
-        result: T = self._kept[key]
-        return result
+        return self._kept[key]
 
     def near(self, path: Path) -> Path | None:
         """A file, or else one of its name that is nearest to its place; None if there is none."""

@@ -252,8 +252,7 @@ class Draft:
         """Where a station is in ground (3,) when all joints stand at zero, as MuJoCo has it before a pose is set."""
         body, location = station
         link, _ = self.robot.link_of["/ground" if body == GROUND else self.mechanism.bodies[body].path]
-        placed: Array = self._at_zero[link.name][:3] @ np.append(location, 1.0)
-        return placed
+        return self._at_zero[link.name][:3] @ np.append(location, 1.0)
 
     @cached_property
     def _at_zero(self) -> dict[str, Array]:

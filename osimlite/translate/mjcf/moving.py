@@ -58,8 +58,7 @@ def _nearest(data: bytes) -> tuple[Array, Array]:
         reached = powers @ bent
         middle, half = 0.5 * (reached.max() + reached.min()), 0.5 * (reached.max() - reached.min())
         bent[0] -= middle
-        result: Array = bent / half
-        return result
+        return bent / half
 
     def second(bends: Array) -> tuple[Array, Array]:
         basis = np.polynomial.chebyshev.chebvander(powers @ first(bends), DEGREE)

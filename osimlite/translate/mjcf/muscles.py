@@ -64,8 +64,7 @@ class Curves(NamedTuple):
 
     def tension(self, lengths: Array, activation: float) -> Array:
         """Tension (L,) that MuJoCo gives the muscle at lengths of its tendon (L,), m, at rest."""
-        result: Array = self.tensions(lengths, (activation,))[0]
-        return result
+        return self.tensions(lengths, (activation,))[0]
 
     def tensions(self, lengths: Array, activations: Sequence[float] = ACTIVATIONS) -> Array:
         """Tensions (A, L) at several activations, by default those that are compared."""
@@ -78,8 +77,7 @@ class Curves(NamedTuple):
         active[(x < self.lmin) | (x > self.lmax)] = 0.0
         stretch = np.maximum(x - self.shift - 1.0, 0.0) / (0.5 * (1.0 + self.end) - 1.0)
         passive = self.fpmax * np.where(stretch <= 1.0, 0.5 * stretch**2, stretch - 0.5)
-        result: Array = self.force * (np.multiply.outer(activations, active) + passive)
-        return result
+        return self.force * (np.multiply.outer(activations, active) + passive)
 
     @classmethod
     def read(cls, lengthrange: Array, gain: Array, bias: Array) -> Curves:
@@ -177,8 +175,7 @@ def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curv
         return Curves(*moved, lmin, lmax, end, fpmax, shift)
 
     def off(x: Array) -> Array:
-        result: Array = ((curves(x.tolist()).tensions(lengths) - tensions) / own.force)[known]
-        return result
+        return ((curves(x.tolist()).tensions(lengths) - tensions) / own.force)[known]
 
     def slopes(x: Array) -> Array:
         # As least_squares finds them, all at once: by steps forward, or back where that leaves the bounds.
@@ -186,8 +183,7 @@ def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curv
         step = np.where((x + step < low) | (x + step > high), -step, step)
         moved = curves([*np.vstack((x, x + np.diag(step))).T[:, :, None]]).tensions(lengths)
         all_off = ((moved - tensions[:, None]) / own.force).swapaxes(1, 2)[known].T.copy()
-        result: Array = ((all_off[1:] - all_off[0]) / (x + step - x)[:, None]).T
-        return result
+        return ((all_off[1:] - all_off[0]) / (x + step - x)[:, None]).T
 
     start, low, high = [own.lmin, own.lmax, own.end, own.fpmax], list(LEAST), list(GREATEST)
     if free:

@@ -55,8 +55,7 @@ class Poses:
 
     def points_at(self, body: int, stations: Array, at: Places) -> Array:
         """Places in ground (k, 3) of stations of a body (k, 3), each in one of the poses, by their places (k,)."""
-        placed: Array = self.origins[body][at] + np.einsum("pij,pj->pi", self.rotations[body][at], stations)
-        return placed
+        return self.origins[body][at] + np.einsum("pij,pj->pi", self.rotations[body][at], stations)
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,10 +128,9 @@ class Router:
 
     def _in_body(self, body: int, at: Places, places: Array) -> Array:
         """Places in ground (k, 3) in some of the poses, in the frame of a body."""
-        result: Array = np.einsum(
+        return np.einsum(
             "pji,pj->pi", self.poses.rotations[body][at], places.reshape(-1, 3) - self.poses.origins[body][at]
         )
-        return result
 
     # ----------------------------------------------------------------------------------------------- options
     def _around(self, numbers: Sequence[int], choose: Choose) -> Tendon:
@@ -159,8 +158,7 @@ class Router:
     def _touched(self, number: int) -> Array:
         """The tangent points (2 k, 3) on a surface, in its own frame."""
         touch, frame = self.touches[number], self.route.surfaces[number].tangent.frame
-        result: Array = (np.concatenate((touch.first, touch.second)) - frame[:3, 3]) @ frame[:3, :3]
-        return result
+        return (np.concatenate((touch.first, touch.second)) - frame[:3, 3]) @ frame[:3, :3]
 
     def _sides(self, number: int, around: Around, directions: int) -> Iterator[Around]:
         """As it is, or with the side of the quadrant, the side that is touched, or one of the directions all around."""

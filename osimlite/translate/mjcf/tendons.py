@@ -174,5 +174,4 @@ def _slid(spot: Spot, force: Array, poses: Poses) -> Array:
     value = poses.q[:, spot.coordinate]
     helper, rate = polyval(value, spot.drive), polyval(value, polyder(spot.drive))
     rates = np.einsum("pij,jp->pi", poses.rotations[spot.body], polyval(helper, polyder(spot.slides.T)) * rate)
-    result: Array = np.einsum("kpi,pi->kp", force, rates)[..., None] * poses.rates[:, spot.coordinate]
-    return result
+    return np.einsum("kpi,pi->kp", force, rates)[..., None] * poses.rates[:, spot.coordinate]

@@ -132,8 +132,7 @@ def _cut(p: Array, one: Array, q: Array, two: Array) -> Mask:
     across = _cross(way, other)
     across = np.where(np.abs(across) < TINY, np.nan, across)
     along, back = _cross(apart, other) / across, _cross(apart, way) / across
-    result: Mask = (along >= 0.0) & (along <= 1.0) & (back >= 0.0) & (back <= 1.0)
-    return result
+    return (along >= 0.0) & (along <= 1.0) & (back >= 0.0) & (back <= 1.0)
 
 
 def _plane(first: Array, second: Array) -> Array:
@@ -154,20 +153,17 @@ def _in(across: Array | None, points: Array) -> Array:
 
 
 def _dot(a: Array, b: Array) -> Array:
-    result: Array = np.einsum("...i,...i->...", a, b)
-    return result
+    return np.einsum("...i,...i->...", a, b)
 
 
 def norm(a: Array) -> Array:
     """Lengths (...) of vectors (..., 3)."""
-    result: Array = np.sqrt(_dot(a, a))
-    return result
+    return np.sqrt(_dot(a, a))
 
 
 def unit(a: Array) -> Array:
     """Vectors (..., 3) of length 1; zero where they are."""
-    result: Array = a / np.maximum(norm(a), np.finfo(float).tiny)[..., None]
-    return result
+    return a / np.maximum(norm(a), np.finfo(float).tiny)[..., None]
 
 
 def _angle(a: Array, b: Array) -> Array:
