@@ -51,8 +51,8 @@ class _Followed(NamedTuple):
     def at(self, data: Any) -> tuple[float, Array, float, float]:
         """Where the function has the joint, its gradient, its rate, and what its curvature adds to the acceleration."""
         x, rates = (data.qpos[self.addresses], data.qvel[self.leaders]) if self.leaders else (data.time, 1.0)
-        value, gradient, hessian = self.function.evaluate(np.atleast_1d(x))
-        rates = np.atleast_1d(rates)
+        value, *derivatives = self.function.evaluate(np.atleast_1d(x))
+        (gradient, hessian), rates = map(np.array, derivatives), np.atleast_1d(rates)
         return value, gradient, float(gradient @ rates), float(rates @ hessian @ rates)
 
 
@@ -293,7 +293,7 @@ class Driver:
                 polynomial[0] = value
                 if len(followed.leaders) == 1:
                     x, slope = self.data.qpos[followed.addresses[0]], gradient[0]
-                    bend = 0.5 * followed.function.evaluate(np.array((x,)))[2][0, 0]
+                    bend = 0.5 * followed.function.evaluate((x,))[2][0][0]
                     polynomial[:3] = value + x * (bend * x - slope), slope - 2.0 * bend * x, bend
                 self.model.eq_data[followed.equality, :5] = polynomial
 

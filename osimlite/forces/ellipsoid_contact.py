@@ -9,10 +9,8 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
+from osimlite.forces.rotations import Axes
 from osimlite.forces.vectors import ZERO, Vector, along, cross, dot, elementwise, minus, norm, over, plus, times
-
-Axes = tuple[Vector, Vector, Vector]
-"""The directions of an ellipsoid's half axes, unit vectors."""
 
 
 def half_space_ellipsoid(

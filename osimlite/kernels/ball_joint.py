@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from osimlite.forces.rotations import along_axes, body_fixed, transposed, turned_axes
 from osimlite.forces.vectors import (
     ZERO,
     Vector,
@@ -17,7 +18,7 @@ from osimlite.forces.vectors import (
     vector,
 )
 from osimlite.kernels.layout import LINK_WORK, MODEL, MOTION, OPERATION, OPERATION_WORK, OUTCOME, WORK
-from osimlite.kernels.motion import add_row, along_axes, axes_of, set_frame, set_row, turned_axes
+from osimlite.kernels.motion import add_row, axes_of, set_frame, set_row
 from osimlite.kernels.parts import operation_ints, operation_work
 from osimlite.kernels.pointers import Floats, Ints, at
 from osimlite.kernels.states import copy
@@ -36,18 +37,13 @@ def place_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
     s3, c3 = sine_cosine(y[angles[2]])
-    axes = axes_of(frame)
-    one = c2 * c3, c1 * s3 + s1 * s2 * c3, s1 * s3 - c1 * s2 * c3
-    two = -c2 * s3, c1 * c3 - s1 * s2 * s3, s1 * c3 + c1 * s2 * s3
-    three = s2, -s1 * c2, c1 * c2
-    end = elementwise(vector(radii, 0), three)
+    axes, turned_by = axes_of(frame), body_fixed(s1, c1, s2, c2, s3, c3)
+    end = elementwise(vector(radii, 0), turned_by[2])
     if j[OPERATION.MOTION] == MOTION.BALL:
         copy(12, frame, kept)
-        set_frame(
-            frame, turned_axes(axes, (one, two, three)), plus(vector(frame, LINK_WORK.POSITION), along_axes(axes, end))
-        )
+        set_frame(frame, turned_axes(axes, turned_by), plus(vector(frame, LINK_WORK.POSITION), along_axes(axes, end)))
     else:
-        axes = turned_axes(axes, ((one[0], two[0], three[0]), (one[1], two[1], three[1]), (one[2], two[2], three[2])))
+        axes = turned_axes(axes, transposed(turned_by))
         set_frame(frame, axes, minus(vector(frame, LINK_WORK.POSITION), along_axes(axes, end)))
         copy(12, frame, kept)
     return OUTCOME.OK

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from osimlite.forces.rotations import Axes, X, Y, Z, along_axes, turned_axes
 from osimlite.forces.vectors import ZERO, Vector, along, cross, plus, put, times, vector
 from osimlite.kernels.layout import (
     FIXED_NUMBERS,
@@ -21,8 +22,6 @@ from osimlite.kernels.parts import link_ints, link_work, operation_ints, operati
 from osimlite.kernels.pointers import Floats, Ints, at, call
 from osimlite.kernels.trigonometry import sine_cosine
 
-Axes = tuple[Vector, Vector, Vector]
-
 BALL_MOVES = 1
 """How far after the law of a ball (or a drift) that places its link is the one that moves it."""
 
@@ -31,7 +30,7 @@ def place(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
     """Rotations, positions and origins of all links, axes of all operations."""
     for link in range(s[MODEL.LINKS]):
         i, here = link_ints(s, link), link_work(s, w, link)
-        axes, origin = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), ZERO
+        axes, origin = (X, Y, Z), ZERO
         if i[LINK.PARENT] >= 0:
             parent = link_work(s, w, i[LINK.PARENT])
             axes, origin = axes_of(parent), vector(parent, LINK_WORK.POSITION)
@@ -74,19 +73,6 @@ def place(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
 def axes_of(rows: Floats) -> Axes:
     """The axes of a frame, whose rotation is given by rows."""
     return (rows[0], rows[3], rows[6]), (rows[1], rows[4], rows[7]), (rows[2], rows[5], rows[8])
-
-
-def along_axes(axes: Axes, a: Vector) -> Vector:
-    """A vector that has these components along axes."""
-    one, two, three = axes
-    x, y, z = a
-    return along(along(times(x, one), y, two), z, three)
-
-
-def turned_axes(axes: Axes, others: Axes) -> Axes:
-    """Axes that have these components along others, which are the first."""
-    one, two, three = others
-    return along_axes(axes, one), along_axes(axes, two), along_axes(axes, three)
 
 
 def set_frame(rows: Floats, axes: Axes, origin: Vector) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.forces.ellipsoid_contact import Axes, ellipsoid_ellipsoid, half_space_ellipsoid
+from osimlite.forces.ellipsoid_contact import ellipsoid_ellipsoid, half_space_ellipsoid
+from osimlite.forces.rotations import Axes
 from osimlite.forces.vectors import dot, minus, put, vector
 from osimlite.kernels.contacts import press
 from osimlite.kernels.layout import CONTACT_WORK, ITEM, MODEL, OUTCOME

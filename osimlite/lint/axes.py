@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
 def axes_of(joint: CustomJoint) -> list[TransformAxis]:
     """The six axes in order: three rotations, three translations."""
-    places = [f"{kind}{number}" for kind in ("rotation", "translation") for number in (1, 2, 3)]
-    return [getattr(joint.spatial_transform, place) for place in places]
+    return [*joint.spatial_transform.axes().values()]
 
 
 def coordinates_of(joint: Joint) -> list[Coordinate]:
@@ -24,14 +23,9 @@ def coordinates_of(joint: Joint) -> list[Coordinate]:
     return [item for item in joint.coordinates if isinstance(item, Coordinate)]
 
 
-def names_on(axis: TransformAxis) -> list[str]:
-    """The coordinates that an axis names."""
-    return [word if isinstance(word, str) else word.name for word in axis.coordinates]
-
-
 def names_on_axes(joint: CustomJoint) -> list[str]:
     """The coordinates that the axes name, each once, in the order in which they are met."""
-    return list(dict.fromkeys(name for axis in axes_of(joint) for name in names_on(axis)))
+    return list(dict.fromkeys(name for axis in axes_of(joint) for name in axis.names))
 
 
 def axes_refused(joint: CustomJoint) -> bool:

@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from osimlite.kernels.constant_curvature import arc_at
 from osimlite.kernels.functions import ARC
-from osimlite.multibody.functions import Function, floats
-from osimlite.multibody.spatial import Array
+from osimlite.multibody.functions import Arguments, Evaluated, Function, floats
 from osimlite.records import dataclass
 
 _SERIES = [(-1.0) ** n / math.factorial(2 * n + first) for first in (1, 2) for n in range(16)]
@@ -34,8 +31,8 @@ class ArcPoint(Function):
         """A bent rod."""
         return [ARC, 1.0, float(self.component), self.length, *self.neutral, len(_SERIES) / 2.0, *_SERIES]
 
-    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+    def evaluate(self, arguments: Arguments) -> Evaluated:
         """Value, gradient (2,) and Hessian (2, 2) at the two angles."""
-        one, two = (arguments + self.neutral).tolist()
+        one, two = (float(own + start) for own, start in zip(arguments, self.neutral, strict=True))
         value, a, b, aa, ab, bb = arc_at(floats(self.table), one, two)
-        return value, np.array((a, b)), np.array(((aa, ab), (ab, bb)))
+        return value, [a, b], [[aa, ab], [ab, bb]]

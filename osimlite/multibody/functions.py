@@ -8,25 +8,31 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
-from itertools import combinations, product
-from typing import Any
-
-import numpy as np
-from numpy.typing import ArrayLike
+from itertools import combinations, pairwise, product
+from typing import TYPE_CHECKING, Any
 
 from osimlite.errors import ModelError
 from osimlite.kernels.functions import MONOMIALS, MONOMIALS_OF_OPENSIM, PIECES, SINE, STEP, several_at, value_at
-from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
+
+if TYPE_CHECKING:
+    from osimlite.multibody.spatial import Array
+
+    Arguments = Sequence[float] | Array
+else:
+    # The linter evaluates without arrays.
+    Arguments = Sequence
+Evaluated = tuple[float, list[float], list[list[float]]]
+"""Value, gradient (k,) and Hessian (k, k) of a function of k numbers."""
 
 
 class Function(ABC):
     """A twice differentiable function of one or several numbers."""
 
     @abstractmethod
-    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+    def evaluate(self, arguments: Arguments) -> Evaluated:
         """Return the value, the gradient (k,) and the Hessian (k, k) at `arguments` (k,)."""
 
     @property
@@ -48,10 +54,10 @@ class Univariate(Function):
     def table(self) -> Sequence[float]:
         """The numbers by which the kernels know it."""
 
-    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+    def evaluate(self, arguments: Arguments) -> Evaluated:
         """Value, first and second derivative at the one argument."""
         value, first, second = self.derivatives(float(arguments[0]))
-        return value, np.array((first,)), np.array(((second,),))
+        return value, [first], [[second]]
 
     def derivatives(self, x: float) -> tuple[float, float, float]:
         """Value, first and second derivative at `x`, all three as plain numbers; NaN where `x` is not finite."""
@@ -75,12 +81,11 @@ class Multivariate(Function):
     def table(self) -> Sequence[float]:
         """The numbers by which the kernels know it."""
 
-    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+    def evaluate(self, arguments: Arguments) -> Evaluated:
         """Value, gradient (k,) and Hessian (k, k)."""
         size = len(arguments)
         places: Any = range(size)
-        values: list[float] = arguments.tolist()
-        given, table, gradient = floats(values), floats([*values, *self.table]), floats([0.0] * size)
+        given, table, gradient = floats(arguments), floats([*arguments, *self.table]), floats([0.0] * size)
 
         def at_rates(*moving: int) -> tuple[float, float]:
             """Value, and second derivative while some arguments change by 1."""
@@ -88,16 +93,23 @@ class Multivariate(Function):
             value, _, curvature = several_at(size, places, table, given, rates, gradient)
             return value, curvature
 
-        value, hessian = at_rates()[0], np.diag([at_rates(k)[1] for k in places]) if size else np.zeros((0, 0))
+        value, hessian = at_rates()[0], zeros(size)[2]
+        for k in places:
+            hessian[k][k] = at_rates(k)[1]
         for one, two in combinations(places, 2):
-            both = at_rates(one, two)[1] - hessian[one, one] - hessian[two, two]
-            hessian[one, two] = hessian[two, one] = 0.5 * both
-        return value, np.array(gradient), hessian
+            both = at_rates(one, two)[1] - hessian[one][one] - hessian[two][two]
+            hessian[one][two] = hessian[two][one] = 0.5 * both
+        return value, list(gradient), hessian
 
 
-def floats(numbers: Sequence[float] | bytes) -> Any:
+def floats(numbers: Arguments | bytes) -> Any:
     """Numbers in a row, for kernels that run as Python: they are read one by one sooner than those of an array."""
     return memoryview(array("d", numbers))
+
+
+def zeros(size: int, value: float = 0.0) -> Evaluated:
+    """What a function of `size` numbers evaluates to that does not change with them."""
+    return value, [0.0] * size, [[0.0] * size for _ in range(size)]
 
 
 _NOTHING = math.nan, math.nan, math.nan
@@ -109,10 +121,9 @@ class Constant(Function):
 
     value: float
 
-    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+    def evaluate(self, arguments: Arguments) -> Evaluated:
         """The value, and zeros for the derivatives."""
-        size = len(arguments)
-        return self.value, np.zeros(size), np.zeros((size, size))
+        return zeros(len(arguments), self.value)
 
     @property
     def table(self) -> Sequence[float]:
@@ -179,7 +190,7 @@ class WeightedSum(Multivariate):
     def table(self) -> Sequence[float]:
         """Each argument in a monomial, and none in the last."""
         size = len(self.weights)
-        powers = np.vstack([np.eye(size), np.zeros(size)]).ravel().tolist()
+        powers = (float(term == place) for term in range(size + 1) for place in range(size))
         return [MONOMIALS, 1.0, size + 1.0, *self.weights, self.start, *powers]
 
 
@@ -231,10 +242,10 @@ class MultivariatePolynomial(Multivariate):
         powers = (float(power) for each in self.powers for power in each)
         return [kind, 1.0, float(len(self.powers)), *self.coefficients, *powers]
 
-    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+    def evaluate(self, arguments: Arguments) -> Evaluated:
         """Value, gradient (k,) and Hessian (k, k)."""
         value, gradient, hessian = super().evaluate(arguments)
-        return value, gradient, np.tile(gradient[:, None], len(gradient)) if self.opensim_derivatives else hessian
+        return value, gradient, [[slope] * len(gradient) for slope in gradient] if self.opensim_derivatives else hessian
 
 
 @dataclass(frozen=True)
@@ -244,10 +255,11 @@ class Scaled(Function):
     scale: float
     function: Function
 
-    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+    def evaluate(self, arguments: Arguments) -> Evaluated:
         """`scale` times value, gradient and Hessian of the function."""
         value, gradient, hessian = self.function.evaluate(arguments)
-        return self.scale * value, self.scale * gradient, self.scale * hessian
+        scale = self.scale
+        return scale * value, [scale * slope for slope in gradient], [[scale * bend for bend in row] for row in hessian]
 
     @property
     def table(self) -> Sequence[float]:
@@ -266,8 +278,8 @@ class PiecewiseLinear(Univariate):
     @property
     def table(self) -> Sequence[float]:
         """The lines, without the last point."""
-        slopes = (np.diff(self.y) / np.diff(self.x)).tolist()
-        return _pieces(self.x[:-1], [*zip(self.y[:-1], slopes, strict=True)])
+        lines = zip(pairwise(self.x), pairwise(self.y), strict=True)
+        return _pieces(self.x[:-1], [(y0, (y1 - y0) / (x1 - x0)) for (x0, x1), (y0, y1) in lines])
 
 
 @dataclass(frozen=True)
@@ -291,20 +303,18 @@ class SimmSpline(Univariate):
     two a line. Intervals narrower than 1e-7 count as 1e-7 wide, as in OpenSim.
     """
 
-    def __init__(self, x: ArrayLike, y: ArrayLike) -> None:
-        self.x: tuple[float, ...] = tuple(np.asarray(x, dtype=float).tolist())
-        self.y: tuple[float, ...] = tuple(np.asarray(y, dtype=float).tolist())
-        points = np.array(self.x)
-        widths = np.maximum(np.diff(points), 1e-7)
-        slopes = np.diff(self.y) / widths
+    def __init__(self, x: Iterable[float], y: Iterable[float]) -> None:
+        self.x, self.y = tuple(map(float, x)), tuple(map(float, y))
+        widths = [max(right - left, 1e-7) for left, right in pairwise(self.x)]
+        slopes = [(y1 - y0) / width for (y0, y1), width in zip(pairwise(self.y), widths, strict=True)]
         # sigma: a sixth of the second derivative at every point.
-        sigma = _spline_curvature(points, widths, slopes)
-        left = slopes - widths * (sigma[1:] + 2.0 * sigma[:-1])
-        last = slopes[-1] + widths[-1] * (sigma[-2] + 2.0 * sigma[-1])
-        cubic = np.append(np.diff(sigma) / widths, 0.0)
-        self._pieces = list(
-            zip(self.y, np.append(left, last).tolist(), (3.0 * sigma).tolist(), cubic.tolist(), strict=True)
-        )
+        sigma = _spline_curvature(self.x, widths, slopes)
+        self._pieces = [
+            (y, slope - width * (after + 2.0 * here), 3.0 * here, (after - here) / width)
+            for y, slope, width, (here, after) in zip(self.y[:-1], slopes, widths, pairwise(sigma), strict=True)
+        ]
+        end = slopes[-1] + widths[-1] * (sigma[-2] + 2.0 * sigma[-1])
+        self._pieces.append((self.y[-1], end, 3.0 * sigma[-1], 0.0))
 
     @property
     def pieces(self) -> tuple[tuple[float, float, float, float], ...]:
@@ -365,20 +375,24 @@ def _interval(knots: Sequence[float], x: float) -> int:
     return low
 
 
-def _spline_curvature(points: Array, widths: Array, slopes: Array) -> Array:
-    """A sixth of the second derivative at each of n points (n,): smooth inside, end conditions as above."""
+def _spline_curvature(points: Sequence[float], widths: Sequence[float], slopes: Sequence[float]) -> list[float]:
+    """A sixth of the second derivative at each of n points: smooth inside, end conditions as above."""
     n = len(points)
     if n == 2:
-        return np.zeros(2)
-    matrix = np.zeros((n, n))
-    right = np.zeros(n)
-    for k in range(1, n - 1):
-        matrix[k, k - 1 : k + 2] = widths[k - 1], 2.0 * (widths[k - 1] + widths[k]), widths[k]
-        right[k] = slopes[k] - slopes[k - 1]
-    matrix[0, :2] = -widths[0], widths[0]
-    matrix[-1, -2:] = widths[-1], -widths[-1]
+        return [0.0, 0.0]
+    # The equations of the points: the diagonal, what is right of them; beside the diagonal are the widths.
+    diagonal = [-widths[0], *(2.0 * (one + two) for one, two in pairwise(widths)), -widths[-1]]
+    right = [0.0, *(after - before for before, after in pairwise(slopes)), 0.0]
     if n > 3:
-        second = np.diff(slopes) / (points[2:] - points[:-2])
-        right[0] = widths[0] ** 2 * (second[1] - second[0]) / (points[3] - points[0])
-        right[-1] = -(widths[-1] ** 2) * (second[-1] - second[-2]) / (points[-1] - points[-4])
-    return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+        # Where three points lie on each other there is no spline.
+        second = [right[k + 1] / ((points[k + 2] - points[k]) or math.nan) for k in (0, 1, n - 4, n - 3)]
+        right[0] = widths[0] * widths[0] * (second[1] - second[0]) / ((points[3] - points[0]) or math.nan)
+        right[-1] = -widths[-1] * widths[-1] * (second[3] - second[2]) / ((points[-1] - points[-4]) or math.nan)
+    for k in range(1, n):
+        share = widths[k - 1] / diagonal[k - 1]
+        diagonal[k] -= share * widths[k - 1]
+        right[k] -= share * right[k - 1]
+    right[-1] /= diagonal[-1]
+    for k in range(n - 2, -1, -1):
+        right[k] = (right[k] - widths[k] * right[k + 1]) / diagonal[k]
+    return right

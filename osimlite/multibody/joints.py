@@ -1,7 +1,7 @@
 """Mobilizers: the joints of a model as products of elementary motions.
 
-Every OpenSim joint type is one line (or one short function) that lists its motions; nothing else in the
-package knows joint types. The conventions (order of coordinates, meaning of speeds) are OpenSim's.
+What the coordinates of a joint type do is a line of its class in the schema, or a short function here; nothing else in
+the package knows joint types. The conventions (order of coordinates, meaning of speeds) are OpenSim's.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.errors import ModelError, SimulationError
+from osimlite.forces.rotations import X, Y, Z
 from osimlite.multibody.arc import ArcPoint
 from osimlite.multibody.functions import Function, Linear
 from osimlite.multibody.motions import (
@@ -24,27 +25,39 @@ from osimlite.multibody.motions import (
     Motion,
     SimbodyAccelerationError,
     SphericalMotion,
-    X,
-    Y,
-    Z,
     place,
     rotate,
     translate,
 )
 from osimlite.multibody.spatial import Array, inverse, rotation_about, transform
 from osimlite.records import dataclass, field
-from osimlite.schema.joints import MotionType
+from osimlite.schema.joints import (
+    BallJoint,
+    FreeJoint,
+    GimbalJoint,
+    Joint,
+    MotionType,
+    PinJoint,
+    PlanarJoint,
+    SliderJoint,
+    UniversalJoint,
+    WeldJoint,
+)
 
-# Coordinates in OpenSim's order: planar rz, tx, ty; free rx, ry, rz, tx, ty, tz.
+
+def _plain(kind: type[Joint]) -> tuple[Motion, ...]:
+    """The motions of a joint type by what its schema says: shifts, then turns, of a ball all at once."""
+    axes, words = {"x": X, "y": Y, "z": Z}, [*enumerate((kind.moves or "").split())]
+    slides = [translate(axes[word[1]], own) for own, word in words if word[0] == "t"]
+    turns = [rotate(axes[word[1]], own) for own, word in words if word[0] == "r"]
+    if kind.speeds_are_rates:
+        return (*slides, *turns)
+    return (*slides, SphericalMotion(tuple(own for turn in turns for own in turn.coordinates)))
+
+
 MOTIONS: dict[str, tuple[Motion, ...]] = {
-    "WeldJoint": (),
-    "PinJoint": (rotate(Z, 0),),
-    "SliderJoint": (translate(X, 0),),
-    "PlanarJoint": (translate(X, 1), translate(Y, 2), rotate(Z, 0)),
-    "UniversalJoint": (rotate(X, 0), rotate(Y, 1)),
-    "GimbalJoint": (rotate(X, 0), rotate(Y, 1), rotate(Z, 2)),
-    "BallJoint": (SphericalMotion((0, 1, 2)),),
-    "FreeJoint": (translate(X, 3), translate(Y, 4), translate(Z, 5), SphericalMotion((0, 1, 2))),
+    kind.__name__: _plain(kind)
+    for kind in (WeldJoint, PinJoint, SliderJoint, PlanarJoint, UniversalJoint, GimbalJoint, BallJoint, FreeJoint)
 }
 """X_FM of the joint types that have no properties of their own."""
 

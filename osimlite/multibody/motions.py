@@ -15,8 +15,9 @@ from typing import Any, Literal
 import numpy as np
 
 from osimlite.errors import SimulationError
+from osimlite.forces.rotations import X, Y, Z
 from osimlite.kernels.ball_joint import angle_drift, angle_row
-from osimlite.multibody.functions import IDENTITY, Constant, Function
+from osimlite.multibody.functions import IDENTITY, Arguments, Constant, Evaluated, Function, zeros
 from osimlite.multibody.spatial import (
     Array,
     rotation_about,
@@ -24,8 +25,6 @@ from osimlite.multibody.spatial import (
 )
 from osimlite.multibody.spatial import inverse as inverse_transform
 from osimlite.records import dataclass, field
-
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 class Motion(ABC):
@@ -139,10 +138,9 @@ class AccelerationErrorAngle(Function):
     places: tuple[int, ...]  # of its arguments among the coordinates of the joint
     component: int
 
-    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+    def evaluate(self, arguments: Arguments) -> Evaluated:
         """Zero and zeros: what it accelerates by is no derivative of these."""
-        size = len(arguments)
-        return 0.0, np.zeros(size), np.zeros((size, size))
+        return zeros(len(arguments))
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,21 +199,16 @@ class EllipsoidPoint(Function):
     component: int
     radius: float
 
-    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+    def evaluate(self, arguments: Arguments) -> Evaluated:
         """Value, gradient (3,) and Hessian (3, 3) at the three angles."""
-        a, b = float(arguments[0]), float(arguments[1])
-        sa, ca, sb, cb = math.sin(a), math.cos(a), math.sin(b), math.cos(b)
-        gradient, hessian = np.zeros(3), np.zeros((3, 3))
+        a, b, r = float(arguments[0]), float(arguments[1]), self.radius
+        sa, ca, sb, cb = math.sin(a), math.cos(a), r * math.sin(b), r * math.cos(b)
         if self.component == 0:
-            value = sb
-            gradient[1], hessian[1, 1] = cb, -sb
-        else:
-            # g(a) cos b with g = -sin a for y and cos a for z, so that g'' = -g.
-            g, slope = (-sa, -ca) if self.component == 1 else (ca, -sa)
-            value = g * cb
-            gradient[:2] = slope * cb, -g * sb
-            hessian[:2, :2] = (-g * cb, -slope * sb), (-slope * sb, -g * cb)
-        return self.radius * value, self.radius * gradient, self.radius * hessian
+            return sb, [0.0, cb, 0.0], [[0.0] * 3, [0.0, -sb, 0.0], [0.0] * 3]
+        # g(a) cos b with g = -sin a for y and cos a for z, so that g'' = -g.
+        g, slope = (-sa, -ca) if self.component == 1 else (ca, -sa)
+        across = -slope * sb
+        return g * cb, [slope * cb, -g * sb, 0.0], [[-g * cb, across, 0.0], [across, -g * cb, 0.0], [0.0] * 3]
 
 
 def rotate(axis: Sequence[float], coordinate: int) -> AxisMotion:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from importlib import import_module
+from itertools import pairwise
+from math import isfinite
 from typing import Any
-
-import numpy as np
 
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.multibody import functions as f
-from osimlite.multibody.smoothing_spline import smoothing_spline
 from osimlite.schema import functions as schema
 from osimlite.schema.base import Object, Unknown
 from osimlite.text import listed
@@ -78,10 +78,9 @@ def _points(function: Any, least: int, *, apart: bool) -> tuple[tuple[float, ...
     x, y = tuple(function.x), tuple(function.y)
     if len(x) != len(y) or len(x) < least:
         raise _Impossible(f"it has {len(x)} x and {len(y)} y; give as many of both, at least {least}")
-    if not (np.isfinite(x).all() and np.isfinite(y).all()):
+    if not all(map(isfinite, (*x, *y))):
         raise _Impossible("a point is not finite; give numbers")
-    steps = np.diff(x)
-    if (steps < 0.0).any() or (apart and (steps == 0.0).any()):
+    if any(after < before or (apart and after == before) for before, after in pairwise(x)):
         raise _Impossible("its x do not increase; sort the points" + (" and remove repeated ones" if apart else ""))
     return x, y
 
@@ -91,7 +90,10 @@ def _gcv(function: schema.GCVSpline) -> f.Function:
     if not 1 <= half_order <= 4:
         raise _Impossible(f"its half_order is {half_order}; give 1 to 4")
     x, y = _points(function, 2 * half_order, apart=True)
-    return smoothing_spline(x, y, half_order, function.error_variance)
+    # The linter values what it can without numpy.
+    splines: Any = import_module("osimlite.multibody.smoothing_spline")
+    made: f.Function = splines.smoothing_spline(x, y, half_order, function.error_variance)
+    return made
 
 
 def _step(function: schema.StepFunction) -> f.Function:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -61,22 +61,14 @@ def unknown_joint(path: str, kind: str) -> UnsupportedError:
     )
 
 
-def transform_axes(transform: schema.SpatialTransform) -> Iterator[tuple[str, schema.TransformAxis]]:
-    """The three rotations and the three translations with their names."""
-    for kind in ("rotation", "translation"):
-        for number in (1, 2, 3):
-            yield f"{kind}{number}", getattr(transform, f"{kind}{number}")
-
-
 def _custom(
     joint: schema.CustomJoint, path: str, opensim_derivatives: bool
 ) -> tuple[tuple[Motion, ...], Sequence[Coordinate]]:
     known = {coordinate.name: coordinate for coordinate in joint.coordinates}
     order: dict[str, int] = {}
     axes: list[TransformAxis] = []
-    for name, axis in transform_axes(joint.spatial_transform):
-        where = f"{name} of '{path}'"
-        words = [word if isinstance(word, str) else word.name for word in axis.coordinates]
+    for name, axis in joint.spatial_transform.axes().items():
+        where, words = f"{name} of '{path}'", axis.names
         for word in words:
             if word not in known:
                 raise ModelError(f"{where} names the coordinate '{word}', which the joint does not have; add it there")

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from osimlite.forces.rotations import about_axis, body_fixed, transposed
+
 Array = NDArray[np.float64]
 
 
@@ -34,28 +36,12 @@ def skews(vectors: Array) -> Array:
 
 def rotation_about(axis: Array, angle: float) -> Array:
     """Rotation matrix (3, 3) by `angle` (rad) about the unit vector `axis` (Rodrigues' formula)."""
-    x, y, z = axis.tolist()
-    s, c = float(np.sin(angle)), float(np.cos(angle))
-    d = 1.0 - c
-    return np.array(
-        (
-            (x * x * d + c, x * y * d - z * s, x * z * d + y * s),
-            (x * y * d + z * s, y * y * d + c, y * z * d - x * s),
-            (x * z * d - y * s, y * z * d + x * s, z * z * d + c),
-        )
-    )
+    return np.array(transposed(about_axis(axis.tolist(), float(np.sin(angle)), float(np.cos(angle)))))
 
 
 def rotation_xyz(angles: Array) -> Array:
     """Rotation matrix Rx(a) Ry(b) Rz(c) of body-fixed X-Y-Z `angles` (rad)."""
-    (s1, s2, s3), (c1, c2, c3) = np.sin(angles).tolist(), np.cos(angles).tolist()
-    return np.array(
-        (
-            (c2 * c3, -c2 * s3, s2),
-            (c1 * s3 + s1 * s2 * c3, c1 * c3 - s1 * s2 * s3, -s1 * c2),
-            (s1 * s3 - c1 * s2 * c3, s1 * c3 + c1 * s2 * s3, c1 * c2),
-        )
-    )
+    return np.array(transposed(body_fixed(*np.stack((np.sin(angles), np.cos(angles)), axis=1).ravel().tolist())))
 
 
 def rotation_about_space(angles: ArrayLike) -> Array:

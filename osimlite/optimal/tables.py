@@ -132,8 +132,8 @@ def splines(problem: Problem, table: StoTable, columns: list[str]) -> list[Serie
 
 def over_time(function: Function, times: Array) -> Array:
     """A function of time at times (n,): its value and both derivatives (3, n)."""
-    found = (function.evaluate(np.array([t])) for t in times.tolist())
-    return np.array([(value, slope[0], curve[0, 0]) for value, slope, curve in found]).T
+    found = (function.evaluate((t,)) for t in times.tolist())
+    return np.array([(value, slope[0], curve[0][0]) for value, slope, curve in found]).T
 
 
 def expect_columns(table: StoTable, columns: Sequence[str]) -> None:

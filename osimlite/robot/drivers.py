@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from osimlite.multibody import functions as f
 from osimlite.multibody.smoothing_spline import PiecewisePolynomial
-from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.robot.lines import as_line
 from osimlite.robot.mimics import couplers
@@ -29,11 +26,15 @@ class Composed(f.Function):
     outer: f.Function
     inner: f.Function
 
-    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+    def evaluate(self, arguments: f.Arguments) -> f.Evaluated:
         """Value, gradient and Hessian, by the chain rule."""
         inner, gradient, hessian = self.inner.evaluate(arguments)
-        value, (first,), ((second,),) = self.outer.evaluate(np.array((inner,)))
-        return value, first * gradient, first * hessian + second * np.outer(gradient, gradient)
+        value, (first,), ((second,),) = self.outer.evaluate((inner,))
+        bends = [
+            [first * bend + second * one * two for bend, two in zip(row, gradient, strict=True)]
+            for row, one in zip(hessian, gradient, strict=True)
+        ]
+        return value, [first * slope for slope in gradient], bends
 
 
 def coordinate_drivers(robot: Robot) -> dict[int, Driver]:
@@ -85,7 +86,7 @@ def knots(function: f.Function) -> tuple[float, ...]:
 
 def _after(outer: f.Function, driver: Driver) -> Driver:
     if driver.coordinate is None:
-        return Driver(None, f.Constant(outer.evaluate(np.array((driver.function.evaluate(np.zeros(1))[0],)))[0]))
+        return Driver(None, f.Constant(outer.evaluate((driver.function.evaluate((0.0,))[0],))[0]))
     first, second = as_line(driver.function), as_line(outer)
     if first == (1.0, 0.0):
         return Driver(driver.coordinate, outer)

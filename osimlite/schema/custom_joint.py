@@ -24,6 +24,11 @@ class TransformAxis(Object):
     function: Single[Function] = made(Constant, name="function")
     """Angle (rad) or displacement (m) as a function of the coordinates."""
 
+    @property
+    def names(self) -> list[str]:
+        """The names of the coordinates."""
+        return [word if isinstance(word, str) else word.name for word in self.coordinates]
+
     @classmethod
     def in_place_of_none(cls, spec: FieldSpec, values: Mapping[str, Any]) -> Function:
         """The function where an element ``<function>`` is there and empty: then the axis moves as its coordinate does.
@@ -54,6 +59,10 @@ class SpatialTransform(Object):
     """Second translation, along an axis of the parent frame that no rotation turns."""
     translation3: Single[TransformAxis] = _axis("translation3", _Z)
     """Third translation, along an axis of the parent frame that no rotation turns."""
+
+    def axes(self) -> dict[str, TransformAxis]:
+        """The axes by the names of their places, in order."""
+        return {name: getattr(self, name) for name in type(self).model_fields if name[-1:] in "123"}
 
 
 class CustomJoint(Joint):

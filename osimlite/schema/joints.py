@@ -28,8 +28,12 @@ class Joint(ModelComponent, abstract=True):
 
     facts = Facts(outputs="power reaction_on_child:SpatialVec reaction_on_parent:SpatialVec")
 
+    moves: ClassVar[str | None] = None
+    """What each coordinate in order does: r turns and t shifts, about or along an axis of the parent frame, about one
+    that is turned by those before it; a letter alone by a rule of the class; None if the joint's own properties decide.
+    The shifts come first."""
     motion_types: ClassVar[tuple[MotionType, ...] | None] = None
-    """The motion of each coordinate in order, or None if the joint's own properties decide it."""
+    """The motion of each coordinate by `moves`."""
     speeds_are_rates: ClassVar[bool] = True
     """Whether its speeds are the rates of its coordinates; otherwise those of its rotations are an angular velocity."""
 
@@ -41,6 +45,11 @@ class Joint(ModelComponent, abstract=True):
     """The generalized coordinates in the order of the class; a CustomJoint has the order of its axes."""
     frames: Many[PhysicalOffsetFrame] = none()
     """Offset frames that belong to the joint, so that its sockets can name places on bodies."""
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        super().__init_subclass__(**named)
+        if cls.moves is not None:
+            cls.motion_types = tuple("rotational" if word[0] == "r" else "translational" for word in cls.moves.split())
 
     def between(
         self,
@@ -93,13 +102,13 @@ def _coordinates(count: int) -> Any:
 class WeldJoint(Joint):
     """No motion."""
 
-    motion_types = ()
+    moves = ""
 
 
 class PinJoint(Joint):
     """Rotation about the common Z axis; coordinate rz."""
 
-    motion_types = ("rotational",)
+    moves = "rz"
 
     coordinates: Many[Coordinate] = _coordinates(1)
 
@@ -107,7 +116,7 @@ class PinJoint(Joint):
 class SliderJoint(Joint):
     """Translation along the common X axis; coordinate tx."""
 
-    motion_types = ("translational",)
+    moves = "tx"
 
     coordinates: Many[Coordinate] = _coordinates(1)
 
@@ -115,7 +124,7 @@ class SliderJoint(Joint):
 class PlanarJoint(Joint):
     """Motion in the parent's XY plane; coordinates rz, tx, ty, the translation along the parent's axes."""
 
-    motion_types = ("rotational", "translational", "translational")
+    moves = "rz tx ty"
 
     coordinates: Many[Coordinate] = _coordinates(3)
 
@@ -123,7 +132,7 @@ class PlanarJoint(Joint):
 class UniversalJoint(Joint):
     """Body-fixed rotations about X, then Y; coordinates rx, ry."""
 
-    motion_types = ("rotational", "rotational")
+    moves = "rx ry"
 
     coordinates: Many[Coordinate] = _coordinates(2)
 
@@ -131,7 +140,7 @@ class UniversalJoint(Joint):
 class GimbalJoint(Joint):
     """Body-fixed rotations about X, Y, Z; the generalized speeds are the rates of the angles."""
 
-    motion_types = ("rotational", "rotational", "rotational")
+    moves = "rx ry rz"
 
     coordinates: Many[Coordinate] = _coordinates(3)
 
@@ -139,7 +148,7 @@ class GimbalJoint(Joint):
 class BallJoint(Joint):
     """Body-fixed rotations about X, Y, Z; the generalized speeds are the angular velocity of M in F, along F."""
 
-    motion_types = ("rotational", "rotational", "rotational")
+    moves = "rx ry rz"
     speeds_are_rates = False
 
     coordinates: Many[Coordinate] = _coordinates(3)
@@ -148,7 +157,7 @@ class BallJoint(Joint):
 class FreeJoint(Joint):
     """Six degrees of freedom: rx, ry, rz as a BallJoint, then tx, ty, tz along the parent's axes."""
 
-    motion_types = ("rotational", "rotational", "rotational", "translational", "translational", "translational")
+    moves = "rx ry rz tx ty tz"
     speeds_are_rates = False
 
     coordinates: Many[Coordinate] = _coordinates(6)
@@ -161,7 +170,7 @@ class EllipsoidJoint(Joint):
         missing={NAN: "radii_x_y_z"}, doubts={"radii_x_y_z": FLAT}, scales={"radii_x_y_z": "socket_parent_frame"}
     )
 
-    motion_types = ("rotational", "rotational", "rotational")
+    moves = "rx ry rz"
     speeds_are_rates = False
 
     coordinates: Many[Coordinate] = _coordinates(3)
@@ -183,7 +192,7 @@ class ScapulothoracicJoint(Joint):
         },
     )
 
-    motion_types = ("rotational", "rotational", "rotational", "rotational")
+    moves = "r r r r"
     speeds_are_rates = False
 
     coordinates: Many[Coordinate] = _coordinates(4)
@@ -199,7 +208,7 @@ class ConstantCurvatureJoint(Joint):
     """A rod of fixed length that bends evenly, such as a spine; bends about X and Z, then twist about Y."""
 
     facts = Facts(scales={"length": "socket_child_frame y"})
-    motion_types = ("rotational", "rotational", "rotational")
+    moves = "r r r"
 
     coordinates: Many[Coordinate] = _coordinates(3)
     neutral_angle_x_z_y: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)

@@ -30,10 +30,9 @@ def motions_of(joint: Joint) -> dict[str, MotionType]:
         return dict(zip(names, joint.motion_types, strict=False))
     result: dict[str, MotionType] = dict.fromkeys(names, "coupled")
     transform: Any = getattr(joint, "spatial_transform", None)
-    for number in range(6) if transform is not None else ():
-        axis = getattr(transform, f"rotation{number + 1}" if number < 3 else f"translation{number - 2}")
+    for place, axis in transform.axes().items() if transform is not None else ():
         if type(axis.function).__name__ == "LinearFunction" and abs(axis.function.coefficients[0]) == 1.0:
-            result |= dict.fromkeys(map(str, axis.coordinates), "rotational" if number < 3 else "translational")
+            result |= dict.fromkeys(axis.names, "rotational" if place.startswith("r") else "translational")
     return result
 
 

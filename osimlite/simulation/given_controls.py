@@ -12,10 +12,9 @@ import numpy as np
 from osimlite.errors import SettingError, SimulationError
 from osimlite.kernels.layout import ITEM, MODEL
 from osimlite.kernels.pointers import Ints
-from osimlite.multibody.functions import Constant, Function, Scaled
+from osimlite.multibody.functions import Arguments, Constant, Evaluated, Function, Scaled, zeros
 from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.smoothing_spline import smoothing_spline
-from osimlite.multibody.spatial import Array
 from osimlite.quantity import tell
 from osimlite.records import dataclass
 from osimlite.schema.base import Object
@@ -34,13 +33,13 @@ class Called(Function):
     function: Callable[[float], float]  # it
     name: str  # of the control, for messages
 
-    def evaluate(self, arguments: Array) -> tuple[float, Array, Array]:
+    def evaluate(self, arguments: Arguments) -> Evaluated:
         """The value, and zeros."""
         x = float(arguments[0])
         value = float(self.function(x))
         if not isfinite(value):
             raise SettingError(f"the control of '{self.name}' is {value} at {x:g} s; give a number")
-        return value, np.zeros(1), np.zeros((1, 1))
+        return zeros(1, value)
 
 
 def driven(controls: Controls, given: Mapping[str, Any] | StoTable | str | Path | None, to: float) -> Controls:

@@ -9,6 +9,7 @@ import pytest
 
 from osimlite.document.source import Source
 from osimlite.document.survey import survey
+from osimlite.forces.rotations import transposed
 from osimlite.lint.placement import default_poses
 from osimlite.lint.subject import Subject
 from osimlite.schema.constraints import Constraint
@@ -31,4 +32,5 @@ def test_default_poses_are_opensims(corpus_model: CorpusModel) -> None:
         pose = poses[id(body)]
         position, rotation = truth[subject.path(body)]
         assert pose.position == pytest.approx(position, abs=1e-8), body.name
-        assert [number for row in pose.rotation for number in row] == pytest.approx(rotation, abs=1e-8), body.name
+        numbers = [number for row in transposed(pose.axes) for number in row]
+        assert numbers == pytest.approx(rotation, abs=1e-8), body.name

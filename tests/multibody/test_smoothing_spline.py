@@ -77,7 +77,7 @@ OPENSIM = {
 
 def _at(spline, x):
     value, first, second = spline.evaluate(np.array((x,)))
-    return value, first[0], second[0, 0]
+    return value, first[0], second[0][0]
 
 
 @given(st.integers(1, 4), st.integers(8, 30), st.integers(0, 2**32 - 1))

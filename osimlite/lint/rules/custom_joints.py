@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, cast
 
 from osimlite.forces.vectors import cross, norm
-from osimlite.lint.axes import axes_of, axes_refused, coordinates_of, names_on
+from osimlite.lint.axes import axes_of, axes_refused, coordinates_of
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
@@ -159,7 +159,7 @@ def idle_coordinate(subject: Subject, found: FindingSink) -> None:
         columns = {coordinate.name: _motion_by(joint, coordinate) for coordinate in coordinates}
         idle = [coordinate for coordinate in coordinates if not any(columns[coordinate.name])]
         for coordinate in idle:
-            axes = [axis.name for axis in axes_of(joint) if coordinate.name in names_on(axis)]
+            axes = [axis.name for axis in axes_of(joint) if coordinate.name in axis.names]
             state = f"does not change {listed(axes)} of it" if axes else "is on no axis of it"
             found(
                 f"{called(coordinate)} of {called(joint)} {state}: accelerations become NaN, without a message",
@@ -183,7 +183,7 @@ def _motion_by(joint: CustomJoint, coordinate: Coordinate) -> list[float]:
     values = {item.name: item.default_value for item in coordinates_of(joint)}
     result = []
     for number, axis in enumerate(axes_of(joint)):
-        names = names_on(axis)
+        names = axis.names
         # Of a name that stands twice the last place counts.
         place = max((place for place, name in enumerate(names) if name == coordinate.name), default=None)
         known = 0.0 if place is None else _slope(axis.function, place, values.get(names[0], 0.0))

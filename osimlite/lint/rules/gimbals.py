@@ -40,7 +40,7 @@ def gimbal_lock(subject: Subject, found: FindingSink) -> None:
     ```
     """
     for joint in subject.each(Joint):
-        turns = turning_axes(joint)
+        turns = turning_axes(subject, joint)
         if len(turns) == 3:
             (first, one), (_, two), (third, three) = turns
             across = (

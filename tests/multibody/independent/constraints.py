@@ -33,7 +33,7 @@ def bond(constraint: Constraint, state: Moved) -> Bond:
         case Prescribed(coordinate, function):
             value, first, second = function.evaluate(np.array((state.time,)))
             rows, bias = mechanism.rate_matrix(q)[[coordinate]], mechanism.rate_bias(q, u)[[coordinate]]
-            return Bond(q[[coordinate]] - value, rows, first, second[0] - bias)
+            return Bond(q[[coordinate]] - value, rows, np.array(first), second[0] - bias)
         case Coupler(dependent, independent, function):
             others, row = list(independent), np.zeros((1, len(q)))
             value, gradient, hessian = function.evaluate(q[others])

@@ -86,7 +86,7 @@ def relative(motion: Motion, q: Array, u: Array) -> RelativeMotion:
             amount, gradient, hessian = function.evaluate(q[own])
             along = np.zeros(len(q) + 2)
             along[own] = gradient
-            along[-2:] = gradient @ u[own], u[own] @ hessian @ u[own]
+            along[-2:] = u[own] @ gradient, u[own] @ np.reshape(hessian, (len(own), len(own))) @ u[own]
             block[slice(0, 3) if kind == "rotate" else slice(3, 6)] = np.outer(axis, along)
             if kind == "rotate":
                 return RelativeMotion(rotation_about(axis, amount), np.zeros(3), block)
