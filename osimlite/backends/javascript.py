@@ -1,4 +1,4 @@
-"""Kernels as JavaScript: the page computes paths by the very functions that simulations run.
+"""Kernels as JavaScript: the page computes poses and paths by the very functions that simulations run.
 
 Kernels are functions of floats, integers, vectors and tuples of these, with the few statements that are read here; what
 else there is in one is an error. Vectors are typed arrays, of which `at` gives the rest from a place on; a law has its

@@ -37,6 +37,8 @@ class Program:
         s: the integers, with addresses that are good in this process.
         x: the numbers, without gravity.
         heavy: the numbers, with gravity.
+        laws: names of the laws that are called.
+        tree: the links, as given.
         order: place in the mechanism of the coordinate of each degree of freedom.
         freedoms: degree of freedom of each coordinate.
         links: link of each body, and of ground as the last (b + 1,); -1 for ground.
@@ -51,7 +53,8 @@ class Program:
         packer.mechanism_records(constraints)
         ints, order = packer.ints, tree.order
         ints[MODEL.STATE_SIZE], ints[MODEL.WORK_SIZE] = 2 * len(order), packer.work
-        for name in dict.fromkeys(packer.laws):
+        self.laws, self.tree = [*dict.fromkeys(packer.laws)], tree
+        for name in self.laws:
             ints[MODEL.LAWS + LAW_NUMBERS[name]] = address(own_function(name))
         integers: Any = memoryview(array("q", ints))
         self.s: Ints = integers
@@ -67,7 +70,7 @@ class Program:
         self.links = np.array([item.link for item in placements])
         self.frames = np.array([item.frame for item in placements])
         # What has an identity is kept, lest another gets it.
-        self._tree, self._kept = tree, [*constraints]
+        self._kept = [*constraints]
         self._others: dict[int, Program] = {}
 
     def keeping(self, constraint: Constraint) -> Program:
@@ -75,7 +78,7 @@ class Program:
         if id(constraint) in self.constraints:
             return self
         if id(constraint) not in self._others:
-            self._others[id(constraint)] = Program(self._tree, (constraint,))
+            self._others[id(constraint)] = Program(self.tree, (constraint,))
         return self._others[id(constraint)]
 
     def equations_of(self, constraint: Constraint) -> tuple[int, int, int]:
@@ -99,7 +102,7 @@ class Program:
     @cached_property
     def still(self) -> NDArray[np.bool_]:
         """Whether each body (and ground as the last) stays when a coordinate moves (b + 1, n)."""
-        links, ends, order, _ = self._tree
+        links, ends, order, _ = self.tree
         still = np.ones((len(links) + 1, len(order)), dtype=bool)
         for number, link in enumerate(links):
             still[number] = still[link.parent]

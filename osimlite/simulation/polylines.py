@@ -10,11 +10,19 @@ import numpy as np
 
 from osimlite.kernels.layout import ITEM, LINK_WORK, MODEL
 from osimlite.kernels.pointers import Ints
-from osimlite.multibody.links import Placement, Places
+from osimlite.kernels.table import LAW_NUMBERS
+from osimlite.multibody.constraints import Lock
+from osimlite.multibody.links import Places
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.elements.items import Item
 from osimlite.simulation.engines.linking import Code, best
+
+OF_MOTIONS = "evaluate", "constrained_dynamics", "project"
+OF_SPEEDS = "move_ball", "move_drift"
+OF_CONSTRAINTS = "prescribe", "bind_bodies", "factorise_law", "minimum_norm_law"
+"""Laws that nobody calls here: those that move a mechanism on, and those that only moment arms are found with, about
+any coordinate and about one with which others must move."""
 
 
 @runtime_checkable
@@ -42,33 +50,36 @@ class Course(Protocol):
 
 
 class Polylines:
-    """Paths by themselves, laid out for the kernels, which take every body for a link.
+    """A mechanism with paths, laid out for the kernels.
 
     Args:
         mechanism: whose bodies and coordinates they depend on.
         routes: what each runs through.
 
     Attributes:
+        program: the mechanism by itself.
+        bound: whether moment arms take in coordinates that must move with others.
         structure: integers, with numbers of laws in the place of addresses.
         laws: names of the laws by this number, of which 0 is none.
-        numbers: of the paths.
+        numbers: of the mechanism, and of the paths.
         items: places of the paths in the structure.
         traces: numbers of the laws that trace them.
         room: the most corners that a path can have.
-        work: length of the work vector, which begins with the links.
+        work: length of the work vector.
     """
 
     def __init__(self, mechanism: Mechanism, routes: Sequence[Course]) -> None:
-        bodies, freedoms = len(mechanism.bodies), len(mechanism.coordinates)
-        places = Places(mechanism, {k: k for k in range(freedoms)}, [Placement(k, np.eye(4)) for k in range(bodies)])
+        program = self.program = mechanism.program
         self.laws, self.items, self.traces = [""], list[int](), list[int]()
-        self.room, self.work = 0, LINK_WORK.SIZE * bodies
-        ints, numbers = [0] * MODEL.LAWS, list[float]()
-        ints[MODEL.DOFS] = freedoms
+        ints, numbers, self.work, self.room = [*program.s], [*program.x], program.s[MODEL.WORK_SIZE], 0
+        self.bound = bool(routes) and not all(isinstance(item, Lock) for item in mechanism.constraints)
+        unused = {*OF_MOTIONS, *(() if routes else OF_SPEEDS), *(() if self.bound else OF_CONSTRAINTS)}
+        for name in program.laws:
+            ints[MODEL.LAWS + LAW_NUMBERS[name]] = 0 if name in unused else self._law(name)
         self._calls: list[int] = []
         for route in routes:
             place = len(ints)
-            for item in route.items(places):
+            for item in route.items(program.tree.places):
                 place = len(ints)
                 ints += [self._law(item.kernel, place), len(numbers), self.work, 0, *item.ints]
                 numbers += item.numbers
@@ -79,8 +90,10 @@ class Polylines:
                 ints.append(self._law(curve, len(ints)))
             self.room = max(self.room, route.corners)
         self.structure, self.numbers = np.array(ints, dtype=np.int64), np.array(numbers)
-        self._w, self._y, self._f = np.zeros(self.work), np.zeros(2 * freedoms), np.zeros(3 * self.room)
-        self._poses = self._w[: LINK_WORK.SIZE * bodies].reshape(bodies, LINK_WORK.SIZE)
+        self._w, self._y, self._f = np.zeros(self.work), np.zeros(2 * len(program.order)), np.zeros(3 * self.room)
+        # The first body of each link.
+        links, bodies = np.unique(program.links[:-1], return_index=True)
+        self._bodies = bodies[links >= 0]
 
     def _law(self, name: str, place: int | None = None) -> int:
         """Number of a law, which may be called from a place in the structure."""
@@ -92,9 +105,9 @@ class Polylines:
 
     @cached_property
     def _linked(self) -> tuple[Code, Ints]:
-        """What runs the laws, and the structure with their addresses."""
+        """What runs the laws of the paths, and the structure with their addresses."""
         code, ints = best(), self.structure.copy()
-        code.make_ready(self.laws[1:])
+        code.make_ready([self.laws[k] for k in dict.fromkeys((*ints[self._calls].tolist(), *self.traces))])
         for place in self._calls:
             ints[place] = code.address(self.laws[ints[place]])
         return code, ints
@@ -110,9 +123,13 @@ class Polylines:
             origins: of the bodies in ground, (b, 3), m.
         """
         code, ints = self._linked
-        self._poses[:, LINK_WORK.ROTATION : LINK_WORK.ROTATION + 9] = rotations.reshape(-1, 9)
-        self._poses[:, LINK_WORK.POSITION : LINK_WORK.POSITION + 3] = origins
-        self._y[: len(q)] = q
+        s, (bodies, order) = self.structure, (self._bodies, self.program.order)
+        links = self._w[s[MODEL.WORK_LINK] :][: LINK_WORK.SIZE * len(bodies)].reshape(-1, LINK_WORK.SIZE)
+        placed = self.program.frames[bodies]
+        turned = rotations[bodies] @ placed[:, :3, :3].swapaxes(1, 2)
+        links[:, LINK_WORK.ROTATION : LINK_WORK.ROTATION + 9] = turned.reshape(-1, 9)
+        links[:, LINK_WORK.POSITION : LINK_WORK.POSITION + 3] = origins[bodies] - (turned @ placed[:, :3, 3:])[:, :, 0]
+        self._y[: len(q)] = q[order]
         given = ints, self.numbers, self._w, self._y, self._f
         result = []
         for item, trace in zip(self.items, self.traces, strict=True):

@@ -17,21 +17,18 @@ from osimlite.meshes.surface import Surface
 from osimlite.meshes.unit_shapes import normals_of
 from osimlite.multibody.constraints import Coupler, Lock, Prescribed
 from osimlite.multibody.extremes import any_numbers
-from osimlite.multibody.functions import IDENTITY, Function
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.motions import AxisMotion
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.translate.function_data import as_data
 from osimlite.translate.sidecar import finite
 from osimlite.view.inspect import component_tree, finding_rows, pins
+from osimlite.view.kernels import kernels_text, program_data, text_of
 from osimlite.view.motion import Motion, activity, moving, values_of
 from osimlite.view.pushes import Pushes
 from osimlite.view.recording import MeasuredMarkers
-from osimlite.view.routes import kernels_text, routes_data, text_of
 from osimlite.view.scene import LAYERS, STEEPEST, Scene
 
-SCRIPTS = ("paths.js", "laws.js", "mechanism.js", "tubes.js", "stage.js", "panels.js", "curves.js", "viewer.js")
+SCRIPTS = ("mechanism.js", "tubes.js", "stage.js", "panels.js", "curves.js", "viewer.js")
 """The parts of the page's own program, in their order."""
 
 TRAVELS = 0.5
@@ -63,7 +60,7 @@ def page_text(data: Mapping[str, Any]) -> str:
         "@TITLE@": html.escape(str(data["name"]) or "osimlite"),
         "@STYLE@": read("page.css"),
         "@LIBRARY@": read("three.js"),
-        "@SCRIPT@": "".join((kernels_text(data["routes"]), *map(read, SCRIPTS))),
+        "@SCRIPT@": "".join((kernels_text(data["program"]), *map(read, SCRIPTS))),
         "@DATA@": words,
     }
     text = read("page.html")
@@ -121,11 +118,11 @@ def page_data(
             "directions": _directions(scene.up),
             "coordinates": _coordinates(mechanism, {item.dependent for item in couplers}, q, recorded),
             "q": q.tolist(),
-            "bodies": _bodies(mechanism),
-            "couplers": [
-                {"dependent": item.dependent, "independent": list(item.independent), "law": as_data(item.function)}
-                for item in couplers
+            "bodies": [
+                {"path": body.path, "name": body.name, "center": body.mass_properties.center.tolist()}
+                for body in mechanism.bodies
             ],
+            "program": program_data(scene.polylines, mechanism.constraints),
             "constraints": others,
             **_drawn(scene),
             "motion": recorded,
@@ -158,7 +155,6 @@ def _drawn(scene: Scene) -> dict[str, Any]:
             }
             for line in scene.lines
         ],
-        "routes": routes_data(scene.polylines),
         "axes": [{**vars(axes), "matrix": _rows(axes.matrix)} for axes in scene.axes],
     }
 
@@ -170,29 +166,6 @@ def _surface(surface: Surface) -> dict[str, str]:
         "normals": text_of(normals),
         "triangles": text_of(surface.triangles.astype("<u4")),
     }
-
-
-def _bodies(mechanism: Mechanism) -> list[dict[str, Any]]:
-    """Every body: who carries it, and the fixed transforms and motions on the way to it."""
-    result = []
-    for body in mechanism.bodies:
-        chain: list[Any] = []
-        for part in body.mobilizer.elementary():
-            if isinstance(part, AxisMotion):
-                places = [body.mobilizer.coordinates[place] for place in part.coordinates]
-                chain.append(
-                    {
-                        "turns": part.kind == "rotate",
-                        "axis": part.axis.tolist(),
-                        "coordinates": places,
-                        "law": _law(part.function),
-                    }
-                )
-            elif not np.array_equal(part.matrix, np.eye(4)):
-                chain.append(_rows(part.matrix))
-        center = body.mass_properties.center.tolist()
-        result.append({"path": body.path, "name": body.name, "parent": body.parent, "center": center, "chain": chain})
-    return result
 
 
 def _coordinates(
@@ -319,11 +292,6 @@ def _directions(up: Array) -> dict[str, list[float]]:
         name: vector.tolist()
         for name, vector in (("home", home), ("front", front), ("side", side), ("top", up + 1e-3 * front))
     }
-
-
-def _law(function: Function) -> dict[str, Any] | None:
-    """A function as the page knows it; None for the identity."""
-    return None if function == IDENTITY else as_data(function)
 
 
 def _rows(matrix: Array) -> list[float]:

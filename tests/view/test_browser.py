@@ -132,11 +132,11 @@ def test_the_page_has_lengths_and_moment_arms_of_paths(shared, open_page, tmp_pa
     # Of knees that move the patella along, of hips, and of what is not crossed.
     for coordinate in ("knee_angle_r", "hip_flexion_r", "ankle_angle_l"):
         place = mechanism.coordinate_index(coordinate)
-        result = page.run("x[1].map((k) => v.mechanism.routes.over(k, x[0], v.mechanism, v.q))", [place, [*range(80)]])
+        result = page.run("x[1].map((k) => v.mechanism.over(k, x[0], v.q))", [place, [*range(80)]])
         path = mechanism.coordinates[place].path
         assert [item["length"] for item in result] == pytest.approx([lengths[name] for name in names], abs=1e-12)
         assert [item["arm"] for item in result] == pytest.approx(
-            [arms[name].get(path, 0.0) for name in names], abs=1e-8
+            [arms[name].get(path, 0.0) for name in names], abs=1e-12
         )
 
 

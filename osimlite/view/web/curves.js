@@ -38,7 +38,7 @@
     at(c, value) {
       const { mechanism, q } = this.viewer, moved = q.slice();
       moved[c] = value;
-      return mechanism.routes.over(this.line.route, c, mechanism, mechanism.coupled(moved));
+      return mechanism.over(this.line.route, c, mechanism.coupled(moved));
     }
 
     over(c, parts) {
@@ -95,8 +95,7 @@
         const found = this.at(c, q[c]);
         for (const { put } of panels) put(q[c], found);
       }
-      mechanism.routes.pose(q, mechanism.poses(q));
-      const length = mechanism.routes.measure(this.line.route), level = data.motion?.activations[this.line.path]?.[this.viewer.stage.row];
+      const length = mechanism.length(this.line.route, q), level = data.motion?.activations[this.line.path]?.[this.viewer.stage.row];
       const activation = level === undefined ? "" : `, activation ${(level / 255).toFixed(2)}`;
       $("#curves strong").textContent = this.line.path.split("/").pop();
       $("#curves span").textContent = `${(100 * length).toFixed(2)} cm${activation}`;

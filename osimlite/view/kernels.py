@@ -1,0 +1,75 @@
+"""A mechanism and its paths for the page: their layout as data, and the kernels that compute them as JavaScript."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from osimlite.backends.javascript import as_javascript
+from osimlite.kernels.constrained_dynamics import bind
+from osimlite.kernels.dynamics import clear_wrenches, generalized_forces
+from osimlite.kernels.layout import CONSTRAINED, ITEM, LINK_WORK, MODEL
+from osimlite.kernels.motion import move, place
+from osimlite.kernels.paths import pull_path
+from osimlite.kernels.projection import project_speeds
+from osimlite.multibody.constraints import Constraint, Coupler
+from osimlite.simulation.elements.laws import law_function
+from osimlite.simulation.polylines import Polylines
+
+FOR_ARMS, FOR_SPEEDS = (move, clear_wrenches, pull_path, generalized_forces), (bind, project_speeds)
+"""What moment arms of paths are found with, and the speeds of coordinates that must move with one."""
+
+
+def program_data(paths: Polylines, constraints: Sequence[Constraint]) -> dict[str, Any]:
+    """What the kernels take, and what the page must know of its layout."""
+    program, s = paths.program, paths.structure
+    head = s[s[MODEL.CONSTRAINED] :]
+    records, errors = s[head[CONSTRAINED.CONSTRAINT_AT] :], head[CONSTRAINED.WORK_ERRORS]
+    # Of each its record, the degree of freedom that depends, and where its error is found.
+    coupled = [
+        (
+            records[program.constraints[id(item)]],
+            program.freedoms[item.dependent],
+            errors + program.equations_of(item)[0],
+        )
+        for item in constraints
+        if isinstance(item, Coupler)
+    ]
+    return {
+        # Of each body, and ground as the last, the link, and the frame in that by rows.
+        "bodies": [*zip(program.links.tolist(), program.frames[:, :3].reshape(-1, 12).tolist(), strict=True)],
+        "structure": text_of(s.astype("<i4")),
+        "numbers": text_of(paths.numbers.astype("<f8")),
+        "laws": paths.laws[1:],
+        "items": paths.items,
+        "traces": paths.traces,
+        "room": paths.room,
+        "work": paths.work,
+        "order": program.order,
+        "couplers": [list(map(int, item)) for item in coupled],
+        "bound": paths.bound,
+        "layout": {
+            "links": int(s[MODEL.WORK_LINK]),
+            "link": LINK_WORK.SIZE,
+            "position": LINK_WORK.POSITION,
+            "laws": MODEL.LAWS,
+            "law": ITEM.LAW,
+            "record": ITEM.RECORD,
+        },
+    }
+
+
+def kernels_text(program: Mapping[str, Any]) -> str:
+    """What the page computes with."""
+    laws = [law_function(name) for name in program["laws"]]
+    others = [place, *(FOR_ARMS if program["items"] else ()), *(FOR_SPEEDS if program["bound"] else ())]
+    kernels = as_javascript(laws, others)
+    return f"window.osimlite = {{ kernels: {kernels} }};\n"
+
+
+def text_of(array: Any) -> str:
+    """The numbers of an array as text (base64), in their order."""
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
