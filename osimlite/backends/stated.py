@@ -34,6 +34,7 @@ class StatedModel:
         name: of the model.
         states: the entries of x as in ``states.sto``: values, speeds, and then auxiliary states, each in the order of
             the model. Coordinates that are locked are none.
+        in_system: the same in the order in which Simbody holds them.
         controls: the entries of u: paths of the actuators.
         parameters: the entries of p.
         p: the values (p,) that the model has for these.
@@ -59,7 +60,8 @@ class StatedModel:
         self.coordinates = tuple(path.rpartition("/")[0] for path in in_model_order(model, own[: moving // 2]))
         values, speeds = ([f"{path}/{what}" for path in self.coordinates] for what in ("value", "speed"))
         self.states = (*values, *speeds, *in_model_order(model, paths))
-        names = {name: place for place, name in enumerate([*own, *paths])}
+        self.in_system = (*own, *paths)
+        names = {name: place for place, name in enumerate(self.in_system)}
         self._places = [names[name] for name in self.states]
         self.controls = self.forces.controls.names
         self.u = np.zeros(len(self.controls))

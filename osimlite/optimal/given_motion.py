@@ -88,7 +88,7 @@ class GivenMotion:
         self.bench = functions_of(bench_of(actuators, own))
         size = len(self.bench.coordinates)
         known = dict(zip(own, self._paths, strict=True))
-        self.states = tuple(_renamed(name, known) for name in self.bench.states[2 * size :])
+        self.states = self.in_system = tuple(_renamed(name, known) for name in self.bench.states[2 * size :])
         self.controls = tuple(_renamed(name, known) for name in self.bench.controls)
         # The carriages have an order of their own.
         names = [path.rpartition("/")[2] for path in self.bench.coordinates]
@@ -131,8 +131,8 @@ class GivenMotion:
         """Values and speeds of all coordinates over time, by paths of states."""
         values, speeds, _ = self._motion(times)
         infos = self.mechanism.coordinates
-        own = ((f"{info.path}/{what}", rows[:, k]) for what, rows in (("value", values), ("speed", speeds))
-               for k, info in enumerate(infos))  # fmt: skip
+        own = ((f"{info.path}/{what}", rows[:, k]) for k, info in enumerate(infos)
+               for what, rows in (("value", values), ("speed", speeds)))  # fmt: skip
         return dict(own)
 
 

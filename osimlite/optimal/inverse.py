@@ -120,7 +120,7 @@ def solved_inverse(
     solution = solved(Program(problem), None, tell, refine)
     trajectory = solution.trajectory
     states = given.inserted(trajectory.times)
-    names = trajectory.names | {"states": (*states, *trajectory.names["states"])}
+    names = trajectory.names | {"states": (*trajectory.names["states"], *states)}
     return replace(solution, trajectory=replace(trajectory, columns=states | trajectory.columns, names=names))
 
 

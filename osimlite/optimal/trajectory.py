@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -52,7 +53,13 @@ class MocoTrajectory:
                 if len(own) < len(times):
                     own = np.interp(times, np.linspace(times[0], times[-1], len(own)), own)
                 columns[name] = own
-        names = {kind: tuple(own) for kind, own in layout.names.items() if kind in COUNTS}
+        # Of a guess Moco takes the columns as they come, whatever their names.
+        rank = {name.removesuffix("/value"): k for k, name in enumerate(layout.problem.functions.in_system)}
+        names = {
+            kind: tuple(sorted(own, key=lambda name: rank.get(re.sub("/(value|accel)$", "", name), len(rank))))
+            for kind, own in layout.names.items()
+            if kind in COUNTS
+        }
         parameters = dict(zip(layout.problem.parameters, w[2 : layout.shared].tolist(), strict=True))
         return cls(times, columns, names, parameters, header or {})
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
 import re
@@ -463,8 +464,71 @@ def test_tracked_markers(tmp_path):
     assert ours == pytest.approx(theirs, rel=1e-10)
 
 
+ANYWHERE = """
+import json, sys
+import numpy as np
+import osimlite
+from osimlite import moco
+from osimlite.optimal.ipopt import violations
+from osimlite.optimal.program import Program
+phase = osimlite.MocoPhase(name="phases", model=osimlite.ModelProcessor(name="model", filepath="model.osim"))
+if sys.argv[1] == "implicit":
+    phase.model.operators += [osimlite.ModOpRemoveMuscles(), osimlite.ModOpAddReserves(optimal_force=7.0)]
+phase.time_initial_bounds = osimlite.MocoInitialBounds(bounds=(0.0,))
+phase.time_final_bounds = osimlite.MocoFinalBounds(bounds=(1.0,))
+for name, bounds in ((".*/value", (-0.3, 0.4)), (".*/speed", (-2.0, 3.0))):
+    phase.state_infos_pattern.append(osimlite.MocoVariableInfo(name=name, bounds=bounds))
+phase.control_infos_pattern.append(osimlite.MocoVariableInfo(name=".*", bounds=(0.1, 0.7)))
+phase.goals.append(osimlite.MocoSumSquaredStateGoal(name="some", pattern=".*_r/.*"))
+solver = osimlite.MocoCasADiSolver(multibody_dynamics_mode=sys.argv[1], num_mesh_intervals=2, optim_max_iterations=0)
+study = osimlite.MocoStudy(problem=osimlite.MocoProblem(name="problem", phases=phase), solver=solver)
+osimlite.write(study, "study.omoco")
+program = Program(moco.problem_of("study.omoco"))
+layout = program.layout
+lower, upper = (np.where(np.isfinite(x), x, end) for x, end in ((layout.lower, -1.0), (layout.upper, 1.0)))
+w = np.random.default_rng(0).uniform(lower, upper)
+moco.MocoTrajectory.of(layout, w).write("ours.sto")
+costs, rows = program.values(w)
+print(json.dumps([costs.sum(), violations(program, w, rows)[0].size]))
+"""
+BEGUN = """
+import json
+from pathlib import Path
+import opensim as osim
+# Ipopt reads that it is not to move the guess away from its bounds.
+Path("ipopt.opt").write_text("bound_push 1e-16\\nbound_frac 1e-16\\nbound_relax_factor 0\\n")
+study = osim.MocoStudy("study.omoco")
+osim.MocoCasADiSolver.safeDownCast(study.updSolver()).setGuessFile("ours.sto")
+solution = study.solve()
+solution.unseal()
+solution.write("theirs.sto")
+print(json.dumps(solution.getObjective()))
+"""
+
+
+@pytest.mark.parametrize(("number", "mode"), [("m0115", "explicit"), ("m0116", "implicit")])
+def test_columns_are_where_moco_looks_for_them(number, mode, tmp_path, corpus):
+    """Moco has of a guess, anywhere between the bounds, the objective and the violation that it has here."""
+    pytest.importorskip("opensim")
+    entry = next(item for item in corpus if item.id == number)
+    (tmp_path / "model.osim").write_bytes(gzip.decompress(entry.converted.read_bytes()))
+    objective, missed = _said(tmp_path, ["-c", ANYWHERE, mode])
+    told = _told(tmp_path, ["-c", BEGUN])
+    assert json.loads(told.splitlines()[-1]) == pytest.approx(objective, rel=1e-12)
+    said = re.search(r"Constraint violation\.+:\s+\S+\s+(\S+)", told)
+    # Accelerations of OpenSim's custom joints are not quite those that follow from their speeds.
+    assert float(said[1]) == pytest.approx(missed, rel=1e-9 if mode == "explicit" else 1e-5)
+    ours, theirs = (read_sto(tmp_path / f"{name}.sto") for name in ("ours", "theirs"))
+    assert ours.columns == theirs.columns
+
+
 def _said(folder, command):
     """What a program prints last."""
+    return json.loads(_told(folder, command).splitlines()[-1])
+
+
+def _told(folder, command):
+    """What a program prints."""
     done = subprocess.run(
         [sys.executable, *command],
         cwd=folder,
@@ -474,4 +538,4 @@ def _said(folder, command):
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
+    return done.stdout
