@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from osimlite.backends.symbols import casadi
@@ -91,7 +91,7 @@ class Dynamics:
     def constraint_errors(self, point: Point, is_mesh: bool) -> tuple[list[str], Formula]:
         """Errors of the model's constraints at a point, with their names."""
         problem, own = self.problem, self.problem.constraint_names
-        if not (own and (is_mesh or problem.projects)):
+        if not problem.binds or not (is_mesh or problem.projects):
             return [], casadi.SX(0, 1)
         position, velocity, _, _ = self._bound(point)
         acceleration = self._bound(point.reached)[2]
@@ -101,6 +101,25 @@ class Dynamics:
             return own, position
         names = [*own, *(f"{name}d" for name in own), *(f"{name}dd" for name in own)]
         return names, casadi.vertcat(position, velocity, acceleration)
+
+    def joint_load(self, path: str, side: str, frame: str) -> Callable[[Point], Formula]:
+        """Moment (N m) and force (N) that a joint pushes one of its bodies with, along the axes of a frame (6, 1)."""
+        load = self.functions.joint_load(path, side)
+
+        def formula(point: Point) -> Formula:
+            force, moment = load(point.t, point.x, point.rates, point.u, point.p, point.multipliers)
+            turn = point.frame(frame).rotation.T
+            return casadi.vertcat(turn @ moment, turn @ force)
+
+        return formula
+
+    def generalized_forces(self, pushing: Sequence[str], coordinates: Sequence[str]) -> Callable[[Point], Formula]:
+        """What coordinates take beyond gravity and the forces of some paths, N and N m."""
+        missing, rows = (
+            self.functions.generalized_forces(pushing),
+            [*map(self.functions.coordinates.index, coordinates)],
+        )
+        return lambda point: missing(point.t, point.x, point.rates, point.u, point.p)[rows]
 
     def _bound(self, point: Point) -> Sequence[Formula]:
         """Errors of positions, speeds and accelerations, and the matrix G."""

@@ -8,7 +8,7 @@ place stands for the length of its path.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,16 +20,16 @@ from osimlite.multibody import build_mechanism
 from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.spatial import Array
 from osimlite.optimal.dynamics import Dynamics
-from osimlite.optimal.point import Formula, Point
+from osimlite.optimal.point import Formula, Point, Series
 from osimlite.optimal.tables import over_time
-from osimlite.schema.actuators import ActivationCoordinateActuator, Actuator, CoordinateActuator
+from osimlite.schema.actuators import ActivationCoordinateActuator, Actuator, CoordinateActuator, ScalarActuator
 from osimlite.schema.frames import Body
 from osimlite.schema.joints import SliderJoint
 from osimlite.schema.model import Model
 from osimlite.schema.motions import PositionMotion
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.paths import GeometryPath, PathPoint
-from osimlite.simulation.static_optimization import StaticOptimization
+from osimlite.simulation.static_optimization import StaticOptimization, ideal
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -73,7 +73,6 @@ class GivenMotion:
     """
 
     coordinates: tuple[str, ...] = ()
-    constraints_kept = 0
 
     def __init__(self, model: Model, motion: Motion, folder: Path) -> None:
         self.mechanism = build_mechanism(model, opensim_derivatives=True)
@@ -95,9 +94,10 @@ class GivenMotion:
         self.carriages = [names.index(name) for name in own]
         self.path_names = tuple(self._paths)
         self.is_muscle = [isinstance(item, Muscle) for item in actuators]
-        self.balanced = tuple(self._pushing.coordinates)
-        self._found: tuple[Array, Array] | None = None
-        self._known = known
+        self.moving = self._pushing.moving
+        self.constraints_kept = self._pushing.equation_count
+        self.numbers = _once(self._numbers)
+        self._known, self._model, self._folder = known, model, folder
 
     def elements(self) -> list[tuple[str, Any]]:
         """The forces on the bench, by the paths of the model."""
@@ -110,22 +110,53 @@ class GivenMotion:
         Raises:
             UnsupportedError: always.
         """
-        raise UnsupportedError("goals of poses, forces or markers are not computed where the motion is given")
+        raise UnsupportedError("goals of poses, outputs or markers are not computed where the motion is given")
 
-    frames = joint_load = generalized_forces = outputs
-
-    def numbers(self, times: Array) -> Array:
-        """What is known at times (t,), one row each: lengths and speeds of m paths, what n coordinates need, and what
-        each of the paths gives each of them by 1 N."""
-        if self._found is None or not np.array_equal(self._found[0], times):
-            self._found = times.copy(), self._numbers(times)
-        return self._found[1]
+    frames = outputs
 
     def _numbers(self, times: Array) -> Array:
+        """What is known at times (t,), one row each: lengths and speeds of m paths, what n coordinates need, what each
+        of the paths gives each of them by 1 N, and the equations of the constraints."""
         values, speeds, accelerations = self._motion(times)
-        needed, pushes = self._pushing.balance(times, values, speeds, accelerations)
+        needed, *matrices = self._pushing.balance(times, values, speeds, accelerations)
         lengths, rates = self._pulling.path_lengths(times, values, speeds)
-        return np.hstack([lengths, rates, needed, pushes.reshape(len(times), -1)])
+        return np.hstack([lengths, rates, needed, *(item.reshape(len(times), -1) for item in matrices)])
+
+    @cached_property
+    def whole(self) -> Any:
+        """Functions of the model, whose actuators push with as many N or N m as their controls say."""
+        model = self._model.copy_deep()
+        forces: Any = model.force_set.objects
+        for place, item in enumerate(forces):
+            if isinstance(item, ScalarActuator) and item.appliesForce:
+                forces[place] = ideal(item, 1.0) or item
+        return functions_of(model, folder=self._folder)
+
+    def linear(self, function: Callable[..., Any], times: Array) -> Array:
+        """What depends on forces in a motion, at times (t,).
+
+        Args:
+            function: ``function(t, x, xdot, u, p, multipliers) -> (k, t)`` of `whole`, that has no squares of forces.
+            times: s.
+
+        Returns:
+            One row each (t, (1 + a + c) k): without them, and what 1 N of each actuator and 1 of each multiplier add.
+        """
+        whole, infos = self.whole, [info.path for info in self.mechanism.coordinates]
+        order = [infos.index(path) for path in whole.coordinates]
+        values, speeds, accelerations = (part[:, order].T for part in self._motion(times))
+        x = np.tile(whole.x[:, None], len(times))
+        x[: 2 * len(order)] = np.vstack([values, speeds])
+        xdot = np.zeros_like(x)
+        xdot[: 2 * len(order)] = np.vstack([speeds, accelerations])
+        places, count = [whole.controls.index(path) for path in self._paths], len(self._paths)
+        found = []
+        for unit in np.eye(1 + count + self.constraints_kept):
+            u = np.zeros(len(whole.controls))
+            u[places] = unit[1 : 1 + count]
+            found.append(np.array(function(times[None], x, xdot, u, [], unit[1 + count :])))
+        found[1:] = [item - found[0] for item in found[1:]]
+        return np.vstack(found).T
 
     def inserted(self, times: Array) -> dict[str, Array]:
         """Values and speeds of all coordinates over time, by paths of states."""
@@ -148,13 +179,14 @@ class GivenDynamics(Dynamics):
             raise problem.refused(problem.phase, "where the motion is given, initial and final time must be fixed")
         given: GivenMotion = self.functions
         start, end = problem.times[0][0], problem.times[1][0]
-        found = given.numbers(start + problem.grid.places * (end - start))
-        # Most actuators push few coordinates.
+        self._times = start + problem.grid.places * (end - start)
+        self._entries = self._series(given.numbers)
+
+    def _series(self, numbers: Callable[[Array], Array]) -> list[Series | None]:
+        """Of numbers (t, m) at times (t,) those that are not zero: most actuators push few coordinates."""
+        found = numbers(self._times)
         matters = np.abs(found).max(axis=0) > NOTHING * np.abs(found).max()
-        self._entries = [
-            problem.given(partial(_column, given, number)) if matters[number] else None
-            for number in range(found.shape[1])
-        ]
+        return [self.problem.given(partial(_column, numbers, k)) if own else None for k, own in enumerate(matters)]
 
     def elements(self) -> list[tuple[str, Any]]:
         """The actuators, by their paths in the model."""
@@ -166,8 +198,7 @@ class GivenDynamics(Dynamics):
         return self._known(point, 0, count), self._known(point, count, count)
 
     def _known(self, point: Point, first: int, count: int) -> Formula:
-        entries = self._entries[first : first + count]
-        return casadi.vertcat(*(casadi.SX(1, 1) if entry is None else point.at(entry) for entry in entries))
+        return _at(point, self._entries[first : first + count])
 
     def _residual(self, point: Point) -> Formula:
         """Of the bench, at rest but for its auxiliary states: what pulls its carriages, and the rates of the states."""
@@ -183,21 +214,75 @@ class GivenDynamics(Dynamics):
         return self._with_rates(point, -self._residual(point)[2 * count :])
 
     def residuals(self, point: Point) -> tuple[list[str], Formula]:
-        """What the motion takes and the actuators do not give, and what tendons and fibers do not share."""
+        """What the motion takes and actuators and constraints do not give, and what tendons and fibers do not share."""
         names, errors = self.tendons.residuals(point, point.derivatives)
-        count, balanced = len(self.functions.path_names), self.functions.balanced
+        count, moving = len(self.functions.path_names), self.functions.moving
+        first, size = 2 * count + len(moving), count * len(moving)
+        needed = self._known(point, 2 * count, len(moving))
+        pushes = casadi.reshape(self._known(point, first, size), count, -1).T
+        bound = casadi.reshape(
+            self._known(point, first + size, point.multipliers.numel() * len(moving)), len(moving), -1
+        )
+        rows = needed - pushes @ self._forces(point) + bound @ point.multipliers
+        return [*(f"{name} residual" for name in moving), *names], casadi.vertcat(rows, errors)
+
+    def joint_load(self, path: str, side: str, frame: str) -> Callable[[Point], Formula]:
+        """As the motion, the actuators and the constraints make it."""
+        load = self.functions.whole.joint_load(path, side)
+        turned = self.functions.whole.frames([frame])
+
+        def function(t: Any, x: Any, xdot: Any, u: Any, p: Any, multipliers: Any) -> Any:
+            turn = np.array(turned(t, x, p)[1]).T.reshape(-1, 3, 3)
+            force, moment = (np.array(part) for part in load(t, x, xdot, u, p, multipliers))
+            # Matrices stand column by column.
+            return np.vstack([np.einsum("tij,jt->it", turn, part) for part in (moment, force)])
+
+        return self._linear(function, 6)
+
+    def generalized_forces(self, pushing: Sequence[str], coordinates: Sequence[str]) -> Callable[[Point], Formula]:
+        """As the motion and the actuators make them."""
+        missing = self.functions.whole.generalized_forces(pushing)
+        rows = [self.functions.whole.coordinates.index(path) for path in coordinates]
+        return self._linear(lambda *given: np.array(missing(*given[:-1]))[rows], len(rows))
+
+    def _linear(self, function: Callable[..., Array], size: int) -> Callable[[Point], Formula]:
+        """Formulas (size, 1) of what forces make in the motion."""
+        entries = self._series(_once(partial(self.functions.linear, function)))
+
+        def formula(point: Point) -> Formula:
+            given = casadi.vertcat(1.0, self._forces(point), point.multipliers)
+            return casadi.reshape(_at(point, entries), size, -1) @ given
+
+        return formula
+
+    def _forces(self, point: Point) -> Formula:
+        """Of the actuators (m, 1), N or N m."""
+        count = len(self.functions.path_names)
         pull = -self._residual(point)[count : 2 * count][self.functions.carriages]
         # Muscles shorten what they pull at.
-        forces = casadi.vertcat(*(-pull[k] if muscle else pull[k] for k, muscle in enumerate(self.functions.is_muscle)))
-        needed = self._known(point, 2 * count, len(balanced))
-        pushes = casadi.reshape(self._known(point, 2 * count + len(balanced), count * len(balanced)), count, -1).T
-        rows = needed - pushes @ forces
-        return [*(f"{name} residual" for name in balanced), *names], casadi.vertcat(rows, errors)
+        return casadi.vertcat(*(-pull[k] if muscle else pull[k] for k, muscle in enumerate(self.functions.is_muscle)))
 
 
-def _column(given: GivenMotion, number: int, times: Array) -> Array:
+def _at(point: Point, entries: Sequence[Series | None]) -> Formula:
+    """The numbers of series, of which those that are None are zero."""
+    return casadi.vertcat(*(casadi.SX(1, 1) if entry is None else point.at(entry) for entry in entries))
+
+
+def _once(numbers: Callable[[Array], Array]) -> Callable[[Array], Array]:
+    """The same function of times, which keeps what it found last."""
+    kept: list[Array] = []
+
+    def known(times: Array) -> Array:
+        if not kept or not np.array_equal(kept[0], times):
+            kept[:] = times.copy(), numbers(times)
+        return kept[1]
+
+    return known
+
+
+def _column(numbers: Callable[[Array], Array], number: int, times: Array) -> Array:
     """One of the numbers of a motion, which is not asked for at other times than these."""
-    found = given.numbers(times)[:, number]
+    found = numbers(times)[:, number]
     return np.stack([found, np.zeros_like(found), np.zeros_like(found)])
 
 

@@ -252,6 +252,15 @@ class Problem(Asked):
         count = self.functions.constraints_kept
         if not count:
             return []
+        if not isinstance(self.functions, GivenMotion):
+            self._expect_method(count)
+        # OpenSim numbers constraints behind those that lock coordinates.
+        coordinates = [part for part in self.components.values() if isinstance(part, Coordinate)]
+        first = sum(1 + (part.prescribed_function is not None) for part in coordinates)
+        return [f"cid{first + number}_p{row}" for number, row in _by_constraint(self.model, count)]
+
+    def _expect_method(self, count: int) -> None:
+        """Refuse settings by which states are not kept on so many equations of constraints."""
         solver = self.solver
         if solver.kinematic_constraint_method == "Bordalba2023":
             if not solver.enforce_constraint_derivatives:
@@ -259,14 +268,8 @@ class Problem(Asked):
         elif solver.transcription_scheme != "hermite-simpson" and solver.enforce_constraint_derivatives:
             message = "constraints of the model with Posa2016 need transcription_scheme hermite-simpson, as in Moco"
             raise self.wrong(solver, message)
-        f = self.functions
-        positions = f.constraints.size1_out(0)
-        if positions != count:
+        if self.functions.constraints.size1_out(0) != count:
             raise self.refused(self.phase, "the model has constraints that bind speeds alone, which is not solved here")
-        # OpenSim numbers constraints behind those that lock coordinates.
-        coordinates = [part for part in self.components.values() if isinstance(part, Coordinate)]
-        first = sum(1 + (part.prescribed_function is not None) for part in coordinates)
-        return [f"cid{first + number}_p{row}" for number, row in _by_constraint(self.model, count)]
 
     def _mesh(self) -> Array:
         solver = self.solver
@@ -296,9 +299,14 @@ class Problem(Asked):
         return terms
 
     @property
+    def binds(self) -> bool:
+        """Whether states have to be kept on constraints."""
+        return bool(self.constraint_names) and not isinstance(self.functions, GivenMotion)
+
+    @property
     def projects(self) -> bool:
         """Whether intervals lead to states that are moved onto the constraints."""
-        return bool(self.constraint_names) and self.solver.kinematic_constraint_method == "Bordalba2023"
+        return self.binds and self.solver.kinematic_constraint_method == "Bordalba2023"
 
     @property
     def projected_names(self) -> list[str]:
@@ -311,7 +319,7 @@ class Problem(Asked):
         """Of the corrections of velocities, or of those of values and of speeds, which Moco names by turns."""
         if self.projects:
             return [f"mu_{name}{end}" for name in self.constraint_names for end in ("", "_dot")]
-        wanted = self.solver.enforce_constraint_derivatives
+        wanted = self.binds and self.solver.enforce_constraint_derivatives
         return [f"gamma_{name}" for name in self.constraint_names] if wanted else []
 
 

@@ -157,7 +157,7 @@ class Program:
         points, is_mesh = range(len(problem.grid.places)), problem.grid.is_mesh
         sorts = [[k for k in points if is_mesh[k]], [k for k in points if not is_mesh[k]]]
         inside = problem.solver.enforce_path_constraint_mesh_interior_points or not problem.path_rows
-        if inside and not problem.constraint_names:
+        if inside and not problem.binds:
             sorts = [[*points]]
         if problem.projects:
             # Nothing leads to the first point.

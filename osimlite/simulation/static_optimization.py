@@ -234,14 +234,29 @@ class StaticOptimization:
         result: Array = shared[..., 0] * self.optimal_forces
         return result
 
-    def balance(self, times: Array, values: Array, speeds: Array, accelerations: Array) -> tuple[Array, Array]:
-        """What the coordinates of `coordinates` need of the actuators (t, m), and what each gives by 1 N (t, m, a).
+    def balance(self, times: Array, values: Array, speeds: Array, accelerations: Array) -> tuple[Array, Array, Array]:
+        """What a motion takes, whether the constraints allow it or not, of each of the f coordinates that can move.
 
-        The accelerations (t, n) are taken as they are, whether the constraints allow them or not.
+        Returns:
+            What they need (t, f), what each actuator gives them by 1 N (t, f, a), and the rows of the constraints'
+            equations (t, c, f): multipliers λ push with -Gᵀ λ.
         """
-        _, ways = self._allowed(times, values, speeds, accelerations)
+        order = list(self._system.order)
+        ways = np.broadcast_to(np.eye(values.shape[1])[:, order], (len(times), values.shape[1], len(order)))
         needed, pushes, _ = self._asked(times, values, speeds, accelerations, ways)
-        return needed, (pushes / self.optimal_forces[:, None]).transpose(0, 2, 1)
+        equations, _ = self._equations(times, values, speeds)
+        return needed, (pushes / self.optimal_forces[:, None]).transpose(0, 2, 1), equations[:, :, order]
+
+    @cached_property
+    def equation_count(self) -> int:
+        """How many equations the constraints make."""
+        head = int(self._system.structure[MODEL.CONSTRAINED])
+        return int(self._system.structure[head + CONSTRAINED.EQUATIONS]) if head else 0
+
+    @property
+    def moving(self) -> list[str]:
+        """Names of the coordinates that can move, in the order of `balance`."""
+        return [self.mechanism.coordinates[place].name for place in self._system.order]
 
     def path_lengths(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array]:
         """Lengths (m) and lengthening speeds (m/s) of the muscles' paths (t, a); 1 and 0 of other actuators."""
@@ -286,25 +301,12 @@ class StaticOptimization:
         udot = wanted.copy()
         if not self.mechanism.constraints:
             return udot, ways
-        system = System(self.mechanism, Forces(()))
-        order, head = list(system.order), int(system.structure[MODEL.CONSTRAINED])
+        bound, drifts = self._equations(times, values, speeds)
         # Locked coordinates are no part of the state, nor of the equations of the kernels.
-        still = [place for place in range(size) if place not in order]
-        count = int(system.structure[head + CONSTRAINED.EQUATIONS]) if head else 0
-        equations, targets = (
-            np.zeros((len(times), count + len(still), size)),
-            np.zeros((len(times), count + len(still))),
-        )
-        equations[:, range(count, count + len(still)), still] = 1.0
-        if count:
-            rows, drifts = (
-                int(system.structure[head + place]) for place in (CONSTRAINED.WORK_ROWS, CONSTRAINED.WORK_DRIFTS)
-            )
-            moments = np.column_stack([times, system.state.rows(values, speeds)])
-            places = [*range(rows, rows + count * len(order)), *range(drifts, drifts + count)]
-            looked = system.looked(moments, places, STAGE.ACCELERATION)
-            equations[:, :count, order] = looked[:, :-count].reshape(len(times), count, -1)
-            targets[:, :count] = looked[:, -count:]
+        still = [place for place in range(size) if place not in self._system.order]
+        unmoved = np.broadcast_to(np.eye(size)[still], (len(times), len(still), size))
+        equations = np.concatenate([bound, unmoved], axis=1)
+        targets = np.hstack([drifts, np.zeros((len(times), len(still)))])
         held = [place for place in range(size) if place not in free]
         inverse = np.linalg.pinv(equations[:, :, held])
         ways[:, held] = -inverse @ equations[:, :, free]
@@ -315,6 +317,23 @@ class StaticOptimization:
         for row in np.flatnonzero(left | ~is_fixed):
             udot[row], ways[row] = self._nearest(equations[row], targets[row], wanted[row])
         return udot, ways
+
+    def _equations(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array]:
+        """Equations G (t, c, n) of the constraints, and what G times the accelerations is to be (t, c)."""
+        system, size = System(self.mechanism, Forces(())), values.shape[1]
+        order, head = list(system.order), int(system.structure[MODEL.CONSTRAINED])
+        count = self.equation_count
+        equations = np.zeros((len(times), count, size))
+        if not count:
+            return equations, np.zeros((len(times), 0))
+        rows, drifts = (
+            int(system.structure[head + place]) for place in (CONSTRAINED.WORK_ROWS, CONSTRAINED.WORK_DRIFTS)
+        )
+        moments = np.column_stack([times, system.state.rows(values, speeds)])
+        places = [*range(rows, rows + count * len(order)), *range(drifts, drifts + count)]
+        looked = system.looked(moments, places, STAGE.ACCELERATION)
+        equations[:, :, order] = looked[:, :-count].reshape(len(times), count, -1)
+        return equations, looked[:, -count:]
 
     def _nearest(self, equations: Array, targets: Array, wanted: Array) -> tuple[Array, Array]:
         """The same at one time, where the held coordinates do not follow from the free ones alone."""

@@ -293,6 +293,23 @@ def test_loads(kind, tmp_path):
     assert ours == pytest.approx(theirs, rel=1e-9)
 
 
+def test_loads_of_a_motion_that_is_given(tmp_path):
+    """Likewise, of joints and coordinates, with what the constraints push."""
+    pytest.importorskip("opensim")
+    model = coupled(links("rigid", "implicit", count=3), "q1")
+    motion = osimlite.PositionMotion(name="motion")
+    for number in range(3):
+        sine = osimlite.Sine(name=f"/jointset/j{number}/q{number}", amplitude=0.3 + number, omega=2.0, phase=0.1)
+        motion.functions.objects.append(sine)
+    model.add(motion)
+    osimlite.write(model, tmp_path / "model.osim")
+    t = np.linspace(0.0, 1.0, 21)
+    write_sto(tmp_path / "moments.sto", "", t, ["q0_moment", "q2_moment"], np.stack([3 * np.sin(2 * t), t], axis=1))
+    theirs, ours = (_said(tmp_path, command) for command in (["-m", "tests.oracle.moco_loads"], ["-c", OUR_LOADS]))
+    assert {"joint0", "joint1", "joint2", "force0", "force1", "force2"} <= theirs.keys()
+    assert ours == pytest.approx(theirs, rel=1e-9)
+
+
 OUR_PROJECTION = """
 import json
 import numpy as np

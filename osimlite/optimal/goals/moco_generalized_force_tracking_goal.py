@@ -19,7 +19,7 @@ from osimlite.schema.states import variables
 def terms(goal: MocoGeneralizedForceTrackingGoal, problem: Problem) -> Terms:
     """The integral of the weighted sum of squares of the distances of what the motion takes beyond gravity and the
     forces of `force_paths` (N, N m) from splines through the table."""
-    functions, pushing = problem.functions, _pushing(goal, problem)
+    pushing = _pushing(goal, problem)
     coordinates: dict[str, Any] = {**variables(problem.model.tree(), "generalized force")}
     known = {
         label: coordinate.path
@@ -32,19 +32,19 @@ def terms(goal: MocoGeneralizedForceTrackingGoal, problem: Problem) -> Terms:
         problem.expect(goal, name, known, "free generalized force")
     given = goal.generalized_force_weights, goal.generalized_force_weights_pattern
     weights = dict(zip(known, problem.weights(goal, *given, [*known], "free generalized force"), strict=True))
-    rows = []
+    rows: list[Any] = []
     for name, series in zip(followed, splines(problem, table, followed), strict=True):
         if weights[name] < 0.0:
             raise problem.wrong(goal, f"the weight of '{name}' is negative, which OpenSim refuses, too")
         greatest = float(np.abs(table[name]).max()) if goal.normalize_tracking_error else 1.0
         if not greatest:
             raise problem.wrong(goal, f"the column '{name}' is zero, so that no error can be divided by its greatest")
-        rows.append((functions.coordinates.index(known[name]), series, weights[name] / greatest**2))
-    missing = functions.generalized_forces(pushing)
+        rows.append((series, weights[name] / greatest**2))
+    missing = problem.dynamics.generalized_forces(pushing, [known[name] for name in followed])
 
     def integrand(point: Point) -> Formula:
-        found = missing(point.t, point.x, point.rates, point.u, point.p)
-        return sum(weight * (found[place] - point.at(series)) ** 2 for place, series, weight in rows)
+        found = missing(point)
+        return sum(weight * (found[k] - point.at(series)) ** 2 for k, (series, weight) in enumerate(rows))
 
     return integral(integrand)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from osimlite.backends.symbols import casadi
 from osimlite.optimal.contacts import weight_of
 from osimlite.optimal.point import Formula, Point, Terms, integral
 from osimlite.optimal.problem import Problem
@@ -23,12 +22,10 @@ def terms(goal: MocoJointReactionGoal, problem: Problem) -> Terms:
     names = goal.reaction_measures or MEASURES
     weights = problem.weights(goal, goal.reaction_weights, None, MEASURES, "reaction measure")
     known = dict(zip(MEASURES, weights, strict=True))
-    load = problem.functions.joint_load(path, side)
+    load = problem.dynamics.joint_load(path, side, frame)
 
     def integrand(point: Point) -> Formula:
-        force, moment = load(point.t, point.x, point.rates, point.u, point.p, point.multipliers)
-        turn = point.frame(frame).rotation.T
-        own = casadi.vertcat(turn @ moment, turn @ force)
+        own = load(point)
         return sum(known[name] * own[MEASURES.index(name)] ** 2 for name in names)
 
     result, weight = integral(integrand), weight_of(problem)
