@@ -63,6 +63,8 @@ class Gradients:
     def __init__(self, plan: Plan) -> None:
         if plan.engine != "compiled" or plan.integrator != MERSON:
             raise SettingError("--method gradient follows Merson's steps of the compiled engine; choose no others")
+        if plan.controller is not None:
+            raise SettingError("what a controller holds between its steps has no derivatives; take another --method")
         if plan.stops:
             raise SettingError("--method gradient is for runs that last their time; leave out --below and --above")
         self._plan, self._variants = plan, Variants(plan)

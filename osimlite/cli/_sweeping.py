@@ -19,9 +19,9 @@ Vary = Annotated[
         metavar="NAME=RANGE",
         help="LOW:HIGH (in a sweep also LOW:HIGH:COUNT; with :log at the end, spread by the logarithm) of a "
         "coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY (@scale: a factor of it), or parameter of "
-        "the model function. MUSCLE/control@0:0.5:6 are six nodes of a control over time, @switch1 is a time at which "
-        "it is switched. Names may have * and ?, and be several with commas: they vary as one; what is "
-        "in {} makes a variable for each text that it stands for.",
+        "the model function or of the controller (all of these where nothing is said). MUSCLE/control@0:0.5:6 are six "
+        "nodes of a control over time, @switch1 is a time at which it is switched. Names may have * and ?, and be "
+        "several with commas: they vary as one; what is in {} makes a variable for each text that it stands for.",
         show_default=False,
     ),
 ]
@@ -86,7 +86,7 @@ def make_plan(
     from osimlite.sweep.variables import parse
 
     ranges = parse(vary or [])
-    if not ranges:
+    if not ranges and choices.get("controller") is None:
         raise SettingError("say what to vary, as in --vary RHip_rz=0.2:0.6")
     levels = {"below": _levels(below, "--stop-below"), "above": _levels(above, "--stop-above")}
     with warnings.catch_warnings():

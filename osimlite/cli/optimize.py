@@ -73,11 +73,14 @@ def optimize(
     workers: sweeping.Workers = None,
     cluster: sweeping.Cluster = None,
     output: Annotated[
-        Path, Option("-o", "--output", metavar="FOLDER", help="For history.parquet, best.osim, summary.json.")
+        Path,
+        Option("-o", "--output", metavar="FOLDER", help="For history.parquet, best.osim, summary.json (and best.par)."),
     ] = Path("optimum"),
     resume: Annotated[bool, Option("--resume", help="Go on with an interrupted or finished search.")] = False,
     force: Annotated[bool, Option("--force", help="Replace what another search found.")] = False,
     controls: options.Controls = None,
+    controller: options.Controller = None,
+    par: options.Par = None,
     interpolation: sweeping.Interpolation = "linear",
     **chosen: Any,
 ) -> None:
@@ -85,6 +88,8 @@ def optimize(
 
     Of muscles: osimlite optimize jumper --objective 'max(center_of_mass_Y)' --maximize
     --vary '{*}_?/control@0:0.3:4=0:1'
+
+    Of reflexes: osimlite optimize arm.osim --objective 'elbow/value' --maximize --controller hold.yaml
 
     Example: osimlite optimize walker.osim --objective distance --vary RHip_rz=0:60deg --vary Pelvis_tx/speed=0:2
     """
@@ -95,7 +100,7 @@ def optimize(
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure or ()), to=to,
         engine=engine, report_interval=report_interval, interpolation=interpolation, is_planted=planted,
-        feet=tuple(foot) if foot else None, **chosen,
+        feet=tuple(foot) if foot else None, controller=options.feedback(controller, par), **chosen,
     )  # fmt: skip
     with progress_bar("searching", budget) as progress:
         result = search(
@@ -107,12 +112,13 @@ def optimize(
 
 
 def _told(objective: str, found: Optimum) -> Facts:
-    from osimlite.sweep.optimize import BEST, HISTORY, SUMMARY
+    from osimlite.sweep.optimize import BEST, HISTORY, PAR, SUMMARY
 
     facts = Facts(f"{objective} {found.value:.6g}")
     for name, value in found.values.items():
         facts.add(name, f"{value:.6g}")
     facts.add("runs", f"{found.evaluations}, the best was number {found.evaluation}")
     facts.add("ended", found.ended)
-    facts.add("files", ", ".join(str(found.model.with_name(name)) for name in (BEST, HISTORY, SUMMARY)))
+    names = BEST, HISTORY, SUMMARY, *([PAR] if found.model.with_name(PAR).exists() else [])
+    facts.add("files", ", ".join(str(found.model.with_name(name)) for name in names))
     return facts

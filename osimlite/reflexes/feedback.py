@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -14,12 +15,12 @@ from osimlite.errors import SettingError
 from osimlite.kernels.reflexes import LIMITS, TERM
 from osimlite.kernels.senses import SENSED
 from osimlite.reflexes.controllers import CONTROLLERS, Reflexes
-from osimlite.reflexes.parameters import Parameters, read_par
+from osimlite.reflexes.parameters import AUTO, Parameter, Parameters, par_line, read_par
 from osimlite.reflexes.scenario import OPTIMIZERS, begun, legs_of
 from osimlite.reflexes.settings import Node, read_settings, settings_of
 from osimlite.reflexes.walkers import Felt
 from osimlite.schema.model import Model
-from osimlite.simulation.held import Held
+from osimlite.simulation.held import Gain, Held
 from osimlite.text import listed, or_known
 
 
@@ -37,7 +38,6 @@ class Feedback:
 
     Attributes:
         step: for which controls are held, s.
-        digest: of all that it is.
 
     Raises:
         DocumentError: it has something that is not done here; its name and line are told.
@@ -66,13 +66,40 @@ class Feedback:
         if isinstance(values, str | Path):
             values = {name: best for name, (best, _, _) in read_par(values).items()}
         self._begun, self._values = known, {**known, **values}
-        told = self._kind, self._node, self.step, self._legs, self._values
-        self.digest = sha256(repr(told).encode()).hexdigest()
         if objective is None:
             top.expect_all_asked("a file of a controller")
 
     def __str__(self) -> str:
         return self._told
+
+    @property
+    def digest(self) -> str:
+        """Of all that it is."""
+        told = self._kind, self._node, self.step, self._legs, self._values
+        return sha256(repr(told).encode()).hexdigest()
+
+    def gains(self, model: Model, engine: Any) -> list[Gain]:
+        """The parameters, for a model with its engine."""
+        _, _, found = self._read(model, engine)
+        return [Gain(each.name, self._values.get(each.name, each.mean), each.low, each.high) for each in found.values()]
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """The same with other values of some parameters."""
+        result = copy(self)
+        result._values = {**self._values, **values}
+        return result
+
+    def par(self) -> str:
+        """The values of parameters that are given, as a file (.par)."""
+        return "".join(par_line(Parameter(name, x, AUTO * abs(x), 0.0, 0.0), x) for name, x in self._values.items())
+
+    def _read(self, model: Model, engine: Any) -> tuple[Felt, Reflexes, dict[str, Parameter]]:
+        felt, parameters = Felt(model, engine, 1, self.step, self._legs), Parameters(self._values)
+        reflexes = Reflexes(self._node, self._kind, felt, parameters)
+        for name in self._values:
+            if name not in parameters.found and name not in self._begun:
+                raise SettingError(f"the controller has no parameter '{name}'{or_known(name, parameters.found)}")
+        return felt, reflexes, parameters.found
 
     def held(self, model: Model, engine: Any) -> Held:
         """What the kernels go by, for a model with its engine.
@@ -80,12 +107,7 @@ class Feedback:
         Raises:
             OsimliteError: the model has not what a reflex names, or a value belongs to no parameter.
         """
-        felt = Felt(model, engine, 1, self.step, self._legs)
-        parameters = Parameters(self._values)
-        reflexes = Reflexes(self._node, self._kind, felt, parameters)
-        for name in self._values:
-            if name not in parameters.found and name not in self._begun:
-                raise SettingError(f"the controller has no parameter '{name}'{or_known(name, parameters.found)}")
+        felt, reflexes, _ = self._read(model, engine)
         plan, numbers = reflexes.compiled()
         # What no reflex names, and no noise, is left to others.
         everything, is_noisy = np.arange(len(felt.names)), numbers[0, LIMITS.CONTROL_NOISE] > 0.0

@@ -99,6 +99,12 @@ class Parameters:
         return np.clip(np.broadcast_to(np.asarray(value, dtype=float), (self.count,)), low, high)
 
 
+def par_line(parameter: Parameter, best: float) -> str:
+    """A line of a file of values, as SCONE has it: name, best, mean, standard deviation."""
+    numbers = "\t".join(f"{number:.17g}" for number in (best, parameter.mean, parameter.std))
+    return f"{parameter.name:<32}\t{numbers}\n"
+
+
 def read_par(path: str | Path) -> dict[str, tuple[float, float, float]]:
     """The best, the mean and the standard deviation of each parameter of a file.
 

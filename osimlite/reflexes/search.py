@@ -10,10 +10,9 @@ import numpy as np
 
 from osimlite._require import require
 from osimlite.errors import SettingError
-from osimlite.files import make_folder, written_atomically
-from osimlite.multibody.spatial import Array
+from osimlite.files import make_folder, write_atomically
 from osimlite.records import dataclass
-from osimlite.reflexes.parameters import Parameter, read_par
+from osimlite.reflexes.parameters import par_line, read_par
 from osimlite.reflexes.scenario import Scenario
 
 BEST = "best.par"
@@ -113,7 +112,9 @@ def search(
             if walked.results[place] < least:
                 best, least = values[place], float(walked.results[place])
                 mean = middle + scale * es.result.xfavorite
-                write_par(path, own, best, mean, scale * es.sigma * np.sqrt(np.diag(es.C)))
+                stds = scale * es.sigma * np.sqrt(np.diag(es.C))
+                found = [each._replace(mean=m, std=s) for each, m, s in zip(own, mean, stds, strict=True)]
+                write_atomically(path, "".join(map(par_line, found, best)))
             if tell is not None:
                 rate = 60.0 * number / (time.perf_counter() - begin)
                 tell(Generation(number, least, float(np.median(walked.results)), float(walked.times.max()), rate))
@@ -122,15 +123,3 @@ def search(
     except KeyboardInterrupt:
         pass
     return dict(zip((each.name for each in own), best.tolist(), strict=True))
-
-
-def write_par(path: Path, parameters: list[Parameter], best: Array, mean: Array, std: Array) -> None:
-    """Write parameters as SCONE does: name, best, mean, standard deviation.
-
-    Raises:
-        OsimliteError: it cannot be written.
-    """
-    with written_atomically(path) as stream:
-        for each, *numbers in zip(parameters, best, mean, std, strict=True):
-            line = "\t".join(f"{number:.17g}" for number in numbers)
-            stream.write(f"{each.name:<32}\t{line}\n".encode())

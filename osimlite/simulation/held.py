@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import floor, inf
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -32,10 +32,35 @@ NEAR = 1e-9
 """A time that is so near to the start of a control step, as part of one, is that."""
 
 
+class Gain(NamedTuple):
+    """A number of a controller that can be varied."""
+
+    name: str
+    value: float
+    low: float  # bounds
+    high: float
+
+    @property
+    def path(self) -> str:
+        """The name again: it is no part of a model."""
+        return self.name
+
+
 class Controller(Protocol):
     """What drives actuators by what it feels, such as :class:`osimlite.Feedback`."""
 
-    digest: str  # of all that it is
+    @property
+    def digest(self) -> str:
+        """Of all that it is."""
+
+    def gains(self, model: Model, engine: Any) -> list[Gain]:
+        """What can be varied of it, for a model with its engine."""
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """The same with other values of some gains."""
+
+    def par(self) -> str:
+        """The values of gains that are given, as a file (.par)."""
 
     def held(self, model: Model, engine: Any) -> Held:
         """What the kernels go by, for a model with its engine."""
@@ -129,6 +154,9 @@ class HeldRuns:
         held, count = helds[0], len(helds)
         self.held, self._before, self.next_step = held, before, INITIAL_STEP
         plan, senses = held.plan.copy(), held.senses
+        # The longest delay of all tells what each has room for.
+        plan[REFLEXES.KEPT] = max(each.plan[REFLEXES.KEPT] for each in helds)
+        plan[REFLEXES.ROOM] = max(each.plan[REFLEXES.ROOM] for each in helds)
         driven = places_of(engine, controls)[[controls.names.index(path) for path in held.paths]]
         self._room, rows = np.zeros((count, plan[REFLEXES.ROOM])), np.zeros((count, senses[SENSES.SIZE]))
         self._room[:, :LEGS] = UNKNOWN if plan[REFLEXES.HAS_STATES] else EARLY_STANCE

@@ -29,7 +29,7 @@ from osimlite.sweep.variables import Floats, refuse_counts
 from osimlite.sweep.variants import Variants
 from osimlite.text import counted
 
-HISTORY, BEST, SUMMARY = "history.parquet", "best.osim", "summary.json"
+HISTORY, BEST, SUMMARY, PAR = "history.parquet", "best.osim", "summary.json", "best.par"
 """What a search writes into its folder."""
 
 Progress = Callable[[float, float], object]
@@ -108,7 +108,7 @@ def optimize(
     Args:
         plan: what is run; its measures are kept in the history too.
         objective: what is wanted.
-        folder: where `history.parquet`, `best.osim` and `summary.json` are written.
+        folder: where `history.parquet`, `best.osim`, `summary.json`, and of a controller `best.par`, are written.
         method: one of `METHODS` in :mod:`osimlite.sweep.search`.
         budget: runs that are allowed.
         popsize: runs between two decisions of the method.
@@ -231,7 +231,7 @@ def _open(path: Path, table: Any, resume: bool, force: bool, evaluations: _Evalu
                 "--resume, or replace them with --force"
             )
     if not force and not path.exists() and not partial_of(path).exists():
-        refuse_overwrite(path.with_name(name) for name in (BEST, SUMMARY))
+        refuse_overwrite(path.with_name(name) for name in (BEST, SUMMARY, PAR))
     partial = Partial(path, table, resume=resume)
     partial.read(evaluations.remember)
     return partial
@@ -356,9 +356,9 @@ def _finish(
             raise SimulationError(f"no run came to its end: {evaluations.reason}")
         raise SimulationError(f"'{wanted['objective']}' is not a finite number in any run")
     cost, number, row = evaluations.best
-    variants.put(row)
-    variants.set_start(row)
-    write(variants.model, where / BEST)
+    write(variants.found(row), where / BEST)
+    if plan.controller is not None:
+        write_atomically(where / PAR, variants.controller(row).par())
     value = evaluations.sign * cost
     named = {item.name: x for item, x in zip(plan.variables, row, strict=True)}
     result = Optimum(value, named, evaluations.count, number, ended, where / BEST, where / HISTORY)

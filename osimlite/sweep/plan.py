@@ -21,6 +21,7 @@ from osimlite.schema.model import Model
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.engines import engine_name
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, MERSON, check_integrator
+from osimlite.simulation.run import Simulation
 from osimlite.simulation.start import in_units_of, suspect_value
 from osimlite.sweep.controls import Control, check_nodes, controller_of
 from osimlite.sweep.measures import is_expression, measure_name
@@ -28,7 +29,7 @@ from osimlite.sweep.variables import Parameter, Range, Variable, variables
 from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:
-    from osimlite.simulation.held import Controller
+    from osimlite.simulation.held import Controller, Gain
 
 Maker = Callable[[Mapping[str, float]], Model]
 """Makes a model from the values of some of its parameters."""
@@ -169,7 +170,8 @@ def plan(
 
     Args:
         source: the model, or what makes it from the parameters that it is given.
-        vary: ranges by name, see :mod:`osimlite.sweep.variables`.
+        vary: ranges by name, see :mod:`osimlite.sweep.variables`; if there are none, all parameters of a controller are
+            varied between their bounds.
         parameters: that `source` takes, with their defaults.
         below: levels that end a run when a coordinate falls below them: rad, m, or a text such as "30deg".
         above: levels that end a run when a coordinate rises above them, likewise.
@@ -185,7 +187,14 @@ def plan(
         source = partial(_driven, maker, controls)
     model = source if isinstance(source, Model) else source({})
     mechanism = build_mechanism(model)
-    result = variables(vary, model, mechanism, parameters)
+    gains: list[Gain] = []
+    if (controller := choices.get("controller")) is not None:
+        own = {name: choices[name] for name in ("skip_unsupported", "wrapping", "folder") if choices.get(name)}
+        gains = controller.gains(model, Simulation(model, **own).engine)
+        vary = vary or {gain.name: _bounds(gain) for gain in gains}
+        if not vary:
+            raise SettingError("say what to vary; the controller has no parameters, which are written as ~2<0,20>")
+    result = variables(vary, model, mechanism, parameters, gains)
     for item in result:
         tell_doubt(item.doubt)
     needs_maker = any(isinstance(item.target, Parameter) for item in result)
@@ -207,6 +216,14 @@ def plan(
     named = (*_stops(mechanism, below, True), *_stops(mechanism, above, False))
     given = (_stop(mechanism, stop.coordinate, stop.level, stop.is_below) for stop in made.stops)
     return replace(made, engine=engine_name(made.engine), stops=(*given, *named))
+
+
+def _bounds(gain: Gain) -> tuple[float, float]:
+    if not (isfinite(gain.low) and isfinite(gain.high)):
+        raise SettingError(
+            f"the parameter '{gain.name}' has no bounds, as in 1~0.1<0,2>; vary it as in {gain.name}=0:2"
+        )
+    return gain.low, gain.high
 
 
 def _copy(text: str, parameters: Mapping[str, float]) -> Model:

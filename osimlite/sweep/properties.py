@@ -5,17 +5,29 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from fnmatch import fnmatchcase
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 from osimlite.errors import SettingError
-from osimlite.multibody.parts import CoordinateInfo
 from osimlite.records import dataclass, replace
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Value
 from osimlite.schema.model import Model
 
-N = TypeVar("N", Component, CoordinateInfo)
+
+class Named(Protocol):
+    """What has a name and a path."""
+
+    @property
+    def name(self) -> str:
+        """Without what it is in."""
+
+    @property
+    def path(self) -> str:
+        """With it."""
+
+
+N = TypeVar("N", bound=Named)
 
 Step = str | int
 """Name of a property, or place in the list that the step before led to."""

@@ -260,7 +260,7 @@ class Runner:
                     accuracy=plan.accuracy,
                     integrator=plan.integrator,
                     report_interval=plan.interval or plan.to,
-                    controller=plan.controller,
+                    controller=variant.controller,
                     initial={infos[k].path: row[k] for k in may} | auxiliary,
                     initial_speeds={infos[k].path: row[count + k] for k in may},
                 )

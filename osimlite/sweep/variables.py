@@ -10,6 +10,7 @@
 ``{*}_?/control``                       the same of each muscle, that of both legs alike
 ``soleus_?/control@0.1``                and what else can be varied of :mod:`controls <osimlite.sweep.controls>`
 ``thigh_length``                        parameter of the function that makes the model
+``flexor-elbow.KP``, ``*.KV``           parameter of a controller, or several
 ``slope``                               gravity tilted in the plane of x and y: a floor that falls towards +x
 ======================================  ==========================================================
 
@@ -39,6 +40,7 @@ from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:
     from osimlite.multibody.parts import CoordinateInfo
+    from osimlite.simulation.held import Gain
 
 Floats = NDArray[np.float64]
 Range = float | str | Sequence[Any]
@@ -84,7 +86,15 @@ class Slope:
     """Gravity of the same size, tilted about z, in rad."""
 
 
-Target = Start | Property | Control | Parameter | Slope
+@dataclass(frozen=True)
+class Gains:
+    """Parameters of a controller that are the same."""
+
+    parts: tuple[str, ...]  # their names
+    present: float  # value of the first
+
+
+Target = Start | Property | Control | Parameter | Slope | Gains
 
 
 @dataclass(frozen=True)
@@ -156,6 +166,7 @@ def variables(
     model: Model,
     mechanism: Mechanism,
     parameters: Mapping[str, Any] = MappingProxyType({}),
+    gains: Sequence[Gain] = (),
 ) -> tuple[Variable, ...]:
     """Find what is meant by names, and read their ranges.
 
@@ -164,6 +175,7 @@ def variables(
         model: that is varied.
         mechanism: of it.
         parameters: of the function that makes it, with their defaults.
+        gains: of a controller.
 
     Raises:
         SettingError: a name means nothing (the nearest is told), a range is none, or a unit does not fit.
@@ -171,7 +183,7 @@ def variables(
     result: list[Variable] = []
     for names, given in ranges.items():
         known = [
-            (name, _target(name, model, mechanism, parameters))
+            (name, _target(name, model, mechanism, parameters, gains))
             for word in each(names, model)
             for name in nodes_of(word)
         ]
@@ -182,7 +194,7 @@ def variables(
                     made = replace(made, doubt=_doubt(made, given, mechanism))
                 result.append(made)
         if all(meaning is None for _, meaning in known):
-            raise _unknown(names, model, mechanism, parameters)
+            raise _unknown(names, model, mechanism, [*parameters, *(gain.name for gain in gains)])
     taken: dict[object, str] = {}
     for item in result:
         for part in getattr(item.target, "parts", (item.target,)):
@@ -206,7 +218,9 @@ def refuse_counts(found: Sequence[Variable]) -> None:
             )
 
 
-def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[str, Any]) -> tuple[Target, str] | None:
+def _target(
+    name: str, model: Model, mechanism: Mechanism, parameters: Mapping[str, Any], gains: Sequence[Gain]
+) -> tuple[Target, str] | None:
     """What a name means, and in what unit; None if nothing."""
     front, _, last = name.rpartition("/")
     for key, is_speed in ((name, False), (front, last == "speed")):
@@ -215,6 +229,8 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
     if name in parameters:
         default = parameters[name]
         return Parameter(name, float(default) if type(default) in (int, float) else None), "parameter"
+    if own := named(name, gains):
+        return Gains(tuple(gain.name for gain in own), own[0].value), "parameter"
     route, _, word = name.partition("@")
     front, _, last = route.rpartition("/")
     if last == "control" and (driven := named(front, model.components(Actuator))):
@@ -222,15 +238,15 @@ def _target(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[s
         return made, made.unit
     if word in ("", SCALE) and (result := places(model, route)):
         unit = result[0].unit
-        if unit.startswith("rad | m") and (own := named(result[0].component, mechanism.coordinates)):
-            unit = own[0].unit or "rad | m"
+        if unit.startswith("rad | m") and (infos := named(result[0].component, mechanism.coordinates)):
+            unit = infos[0].unit or "rad | m"
         return Property(result, bool(word)), "" if word else unit
     if name == "slope":
         return Slope(), "rad"
     return None
 
 
-def _unknown(name: str, model: Model, mechanism: Mechanism, parameters: Mapping[str, Any]) -> SettingError:
+def _unknown(name: str, model: Model, mechanism: Mechanism, parameters: Sequence[str]) -> SettingError:
     """The error for a name that means nothing."""
     route = name.partition("@")[0]
     if named(route, model.components(Actuator)):
@@ -321,5 +337,7 @@ def _number(name: str, part: object, unit: str) -> float:
     if not given.is_angle and unit in ("m", "m/s", "rad | m", "rad/s | m/s"):
         return given.value
     if unit == "parameter":
-        raise SettingError(f"'{name}' is a parameter of a function, whose unit only that knows; give a plain number")
+        raise SettingError(
+            f"'{name}' is a parameter of a function or a controller, whose unit only that knows; give a plain number"
+        )
     raise SettingError(f"'{name}' is in {unit or 'no unit'}, which '{part}' does not fit")

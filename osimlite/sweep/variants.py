@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from osimlite.errors import OsimliteError, SettingError, SimulationError
-from osimlite.records import dataclass
+from osimlite.records import dataclass, replace
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Component
 from osimlite.schema.controllers import Controller
@@ -30,9 +30,10 @@ from osimlite.simulation.states import StateLayout
 from osimlite.sweep.controls import Control, VariedControls, controller_of
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.registry import start_named
-from osimlite.sweep.variables import Floats, Parameter, Property, Slope, Start
+from osimlite.sweep.variables import Floats, Gains, Parameter, Property, Slope, Start
 
 if TYPE_CHECKING:
+    from osimlite.simulation.held import Controller as Feedback
     from osimlite.simulation.held import Held
 
 RENEWED = Force, Controller, Body, Model
@@ -51,7 +52,8 @@ class Variant:
     numbers: Floats  # all numbers of an engine that computes batches, empty for others
     maker: Callable[[], Any]  # makes its engine
     simulation: Simulation | None = None  # that the engine is part of; None if only forces are new
-    held: Held | None = None  # of its controller
+    controller: Feedback | None = None
+    held: Held | None = None  # of it
 
     @cached_property
     def engine(self) -> Any:
@@ -78,6 +80,8 @@ class Variants:
         starts = [(k, part) for k, target in enumerate(targets) if isinstance(target, Start) for part in target.parts]
         self._starts = [(k, part.coordinates[0], part.is_speed) for k, part in starts]
         self._changes = [k for k, target in enumerate(targets) if not isinstance(target, Start)]
+        self._gains = [k for k, target in enumerate(targets) if isinstance(target, Gains)]
+        self._controller = plan.controller
         self._parameters = [k for k, target in enumerate(targets) if isinstance(target, Parameter)]
         self._adopt(plan.model())
         self.given = self._whole()
@@ -189,7 +193,7 @@ class Variants:
                 result.append(info.default_speed if item.target.is_speed else info.default_value)
             elif isinstance(item.target, Property):
                 result.append(1.0 if item.target.is_scaled else setters[index][0].get())
-            elif isinstance(item.target, Control):
+            elif isinstance(item.target, Control | Gains):
                 result.append(item.target.present)
             else:
                 result.append(item.target.default if isinstance(item.target, Parameter) else 0.0)
@@ -208,6 +212,21 @@ class Variants:
                 coordinate = coordinates[engine.mechanism.coordinates[place].path]
                 coordinate.default_value, coordinate.default_speed_value = row[number], row[number + len(engine.order)]
 
+    def controller(self, values: Sequence[float]) -> Feedback:
+        """That of a sample."""
+        assert self._plan.controller is not None
+        variables = self._plan.variables
+        parts = ((name, values[k]) for k in self._gains for name in getattr(variables[k].target, "parts", ()))
+        return self._plan.controller.with_values({name: float(value) for name, value in parts})
+
+    def found(self, values: Sequence[float]) -> Model:
+        """The model of a sample, as others are to have it."""
+        self.put(values)
+        self.set_start(values)
+        if self._plan.controller is not None:
+            self.model.remove(self._open)
+        return self.model
+
     def put(self, values: Sequence[float]) -> None:
         """Make `model` that of a sample, but for its initial state.
 
@@ -218,6 +237,8 @@ class Variants:
             assert self._plan.make is not None
             names = {self._plan.variables[place].name: float(values[place]) for place in self._parameters}
             self._adopt(self._plan.make(names))
+        if self._gains:
+            self._controller = self.controller(values)
         for place, setters in self._setters:
             for setter in setters:
                 setter.put(float(values[place]))
@@ -247,7 +268,7 @@ class Variants:
         owners += self._controls.controllers
         if self._plan.controller is not None:
             # To which what it says is added, behind all else.
-            model.add(controller_of(model, {item.path: 0.0 for item in model.components(Actuator)}))
+            self._open = model.add(controller_of(model, {item.path: 0.0 for item in model.components(Actuator)}))
         can_renew = self._plan.engine == "compiled" and not self._parameters
         self._owners = owners if can_renew and all(isinstance(item, RENEWED) for item in owners) else None
 
@@ -265,16 +286,20 @@ class Variants:
         kind = (*(info.path for info in infos), *engine.order, *engine.contacts)
         structure = repr(kind).encode() + getattr(engine, "structure", np.zeros(0)).tobytes()
         numbers = getattr(engine, "numbers", np.zeros(0))
-        return Variant(simulation.state, structure, numbers, lambda: engine, simulation, self._held(engine))
+        return self._controlled(Variant(simulation.state, structure, numbers, lambda: engine, simulation))
 
-    def _held(self, engine: Any) -> Held | None:
-        return None if self._plan.controller is None else self._plan.controller.held(self.model, engine)
+    def _controlled(self, variant: Variant) -> Variant:
+        if self._controller is not None:
+            variant.controller, variant.held = self._controller, self._controller.held(self.model, variant.engine)
+        return variant
 
     def _make(self, values: Sequence[float]) -> Variant:
         self.put(values)
+        given = self.given
+        if self._changes == self._gains:
+            return self._controlled(replace(given))
         if self._owners is None:
             return self._whole()
-        given = self.given
         if self._renewal is None:
             self._renewal = given.engine.renewal(self.model, Path(self._plan.folder or "."), self._plan.wrapping)
         made = self._renewal.renewed(self._owners)
@@ -282,7 +307,4 @@ class Variants:
             return self._whole()
         # The auxiliary states may start otherwise.
         state = StateLayout(made.mechanism, given.state.order, made.forces.elements)
-        variant = Variant(state, given.structure, made.numbers, made.engine)
-        if self._plan.controller is not None:
-            variant.held = self._held(variant.engine)
-        return variant
+        return self._controlled(Variant(state, given.structure, made.numbers, made.engine))

@@ -364,3 +364,75 @@ def test_kernels_as_python_go_likewise(model, monkeypatch) -> None:
     assert plain.states.rows == pytest.approx(expected.states.rows, rel=1e-12, abs=1e-12)
     assert expected.controller is not None and plain.controller is not None
     assert plain.controller.rows == pytest.approx(expected.controller.rows, rel=1e-9, abs=1e-12)
+
+
+SOUGHT = {
+    "dual_sided": 0,
+    "DofReflex": {"target": "motor", "source": "elbow", "P0": 1.2, "KP": "~1<0,9>", "KV": "~0.2<0,1>",
+                  "delay": "~0.005<0,0.05>"},
+}  # fmt: skip
+
+
+def test_gains_of_many_runs_are_those_of_single_ones_bit_for_bit(model) -> None:
+    """Also with delays that differ, and beside other numbers of the model."""
+    from osimlite.sweep.plan import plan
+    from osimlite.sweep.runner import Runner
+
+    feedback = osimlite.Feedback({"ReflexController": SOUGHT})
+    choices = {"to": 0.3, "measures": ("elbow/value",), "controller": feedback}
+    made = plan(model, {}, **choices)
+    assert {item.name: (item.low, item.high) for item in made.variables} == {
+        "motor-elbow.delay": (0.0, 0.05), "motor-elbow.KP": (0.0, 9.0), "motor-elbow.KV": (0.0, 1.0),
+    }  # fmt: skip
+    rows = np.array([[0.0, 5.0, 0.1], [0.05, 0.0, 0.0], [0.013, 2.0, 0.9]])
+    together = Runner(made).run(rows)
+    names = [item.name for item in made.variables]
+    for k, row in enumerate(rows.tolist()):
+        controller = feedback.with_values(dict(zip(names, row, strict=True)))
+        alone = simulate(model, 0.3, controller=controller, engine="compiled")
+        assert together.measures["elbow/value"][k] == alone.values[-1, -1]
+    both = plan(model, {"*.K?": "0:1", "motor/optimal_force": "1:3", "elbow": "0.4:0.9"}, **choices)
+    found = Runner(both).run(np.array([[0.7, 1.5, 0.5]])).measures["elbow/value"][0]
+    own = model.copy_deep()
+    own.tree().by_path["/forceset/motor"].optimal_force = 1.5
+    controller = feedback.with_values({"motor-elbow.KP": 0.7, "motor-elbow.KV": 0.7})
+    alone = simulate(own, 0.3, controller=controller, initial={"elbow": 0.5}, engine="compiled")
+    assert found == alone.values[-1, -1]
+
+
+def test_a_search_for_gains(model, tmp_path) -> None:
+    """What it finds is a file of parameters, and what goes by it is as good."""
+    pytest.importorskip("yaml", reason="needs PyYAML (extra 'yaml')")
+    pytest.importorskip("pyarrow", reason="needs pyarrow (extra 'sweep')")
+    import json
+
+    from tests.cli.command import run as command
+
+    osimlite.write(model, tmp_path / "arm.osim")
+    text = json.dumps({"ReflexController": SOUGHT}).replace('"~0.005<0,0.05>"', "0.005").replace("1.2", "0.5")
+    (tmp_path / "hold.yaml").write_text(text)
+    given = ["--controller", tmp_path / "hold.yaml", "--to", "0.3"]
+    words = ["optimize", tmp_path / "arm.osim", *given, "--objective", "max(elbow)-min(elbow)"]
+    out = tmp_path / "out"
+    result = command(*words, "--budget", "40", "--method", "nelder-mead", "-o", out)
+    assert result.code == 0 and "best.par" in result.out
+    summary = json.loads((out / "summary.json").read_text())
+    begun = simulate(model, 0.3, controller=osimlite.Feedback(tmp_path / "hold.yaml"), engine="compiled")
+    best = osimlite.Feedback(tmp_path / "hold.yaml", out / "best.par")
+    found = simulate(osimlite.read(out / "best.osim"), 0.3, controller=best, engine="compiled")
+    assert np.ptp(found.values[:, -1]) == pytest.approx(summary["value"], abs=1e-12)
+    assert summary["value"] < 0.9 * np.ptp(begun.values[:, -1])
+    assert "PrescribedController" not in (out / "best.osim").read_text()
+    for more, told in (
+        (["--method", "gradient"], "has no derivatives"),
+        (["--vary", "motor-elbow.KQ=0:1"], "number 'motor-elbow.KQ' to vary; did you mean 'motor-elbow.KP'"),
+        (["--vary", "motor-elbow.KP=0:1deg"], "whose unit only that knows"),
+    ):
+        refused = command(*words, *more, "-o", tmp_path / "other")
+        assert refused.code != 0 and told in refused.err.replace("\n", " ")
+    (tmp_path / "hold.yaml").write_text(text.replace("~1<0,9>", "~1"))
+    refused = command(*words, "-o", tmp_path / "other")
+    assert refused.code != 0 and "'motor-elbow.KP' has no bounds" in refused.err.replace("\n", " ")
+    (tmp_path / "hold.yaml").write_text(text.replace("~", "").replace("<0,9>", "").replace("<0,1>", ""))
+    refused = command(*words, "-o", tmp_path / "other")
+    assert refused.code != 0 and "say what to vary" in refused.err
