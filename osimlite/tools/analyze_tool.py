@@ -18,7 +18,15 @@ from osimlite.text import listed
 from osimlite.tools.job import Job
 from osimlite.tools.motion import Motion, Record
 from osimlite.tools.outcome import Outcome
-from osimlite.tools.through_time import StateRows, analyse, analyses_of, simulation_of, tell_rows, told_model
+from osimlite.tools.through_time import (
+    StateRows,
+    analyse,
+    analyses_of,
+    constrained,
+    simulation_of,
+    tell_rows,
+    told_model,
+)
 
 SAME_TIME = 2.0**-45.5
 """How much later or earlier a row of speeds may be than that of the coordinates, s."""
@@ -75,13 +83,7 @@ def _followed(
         speeds = recorded.rates[0]
     else:
         own, speeds, others = _given(job, given, recorded, simulation)
-    if simulation.constraints:
-        recorded = recorded.assembled()
-        if not model.constraint_set.objects:
-            # Then OpenSim has the speeds fulfil what is prescribed, too.
-            moments = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
-            speeds = np.array([mechanism.project_speeds(q, u, time) for time, q, u in moments])
-    rows = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
+    rows = zip(recorded.times.tolist(), *constrained(recorded, speeds, simulation, model), strict=True)
 
     def states() -> Iterator[tuple[float, list[float]]]:
         for number, (t, q, u) in enumerate(rows):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from osimlite.schema.tools.tracking import CMCTool
 from osimlite.tools.job import Job
-from osimlite.tools.not_runnable import NotRunnable
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.through_time import simulation_of, told_model
 from osimlite.tools.tracked import track
@@ -15,8 +14,7 @@ def run(job: Job, outcome: Outcome) -> None:
     """Follow the motion window by window, and write controls, states and forces."""
     setup: CMCTool = job.setup
     if setup.actuators_to_exclude:
-        message = "actuators_to_exclude is given, and all actuators are controlled here; leave it empty"
-        raise NotRunnable(message, file=str(job.file))
+        raise job.unable("actuators_to_exclude is given, and all actuators are controlled here; leave it empty")
     model = told_model(job)
     with simulation_of(job, model) as simulation:
         desired = Desired.of(job, outcome, simulation, model)

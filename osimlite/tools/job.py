@@ -9,12 +9,18 @@ from typing import Any
 from osimlite.document.kept import read_anew
 from osimlite.document.reader import read_document
 from osimlite.document.source import Source
-from osimlite.errors import DocumentError
+from osimlite.errors import DocumentError, UnsupportedError
 from osimlite.records import dataclass
 from osimlite.schema.model import Model
 
 NONE = frozenset(("", "Unassigned"))
 """What stands for no file."""
+
+
+class NotRunnable(UnsupportedError):
+    """A document, or a part of it, is not what can be run."""
+
+    exit_code = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +36,10 @@ class Job:
     def error(self, message: str) -> DocumentError:
         """An error of the setup."""
         return DocumentError(message, file=str(self.file))
+
+    def unable(self, message: str) -> NotRunnable:
+        """An error of what the setup asks for and nobody computes here."""
+        return NotRunnable(message, file=str(self.file))
 
     def path(self, tag: str) -> Path | None:
         """The file that a property names; None if it names none.

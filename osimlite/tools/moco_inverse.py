@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from osimlite.tools.job import Job
 from osimlite.tools.moco_study import report, telling
-from osimlite.tools.not_runnable import NotRunnable
 from osimlite.tools.outcome import Outcome
 
 
@@ -14,8 +13,7 @@ def run(job: Job, outcome: Outcome) -> None:
     from osimlite.optimal.inverse import problem_of_inverse, solved_inverse
 
     if job.setup.output_paths:
-        message = "output_paths is given, and outputs of the solution are not computed here; leave it empty"
-        raise NotRunnable(message, file=str(job.file))
+        raise job.unable("output_paths is given, and outputs of the solution are not computed here; leave it empty")
     problem = problem_of_inverse(job.setup, job.file)
     solution = solved_inverse(problem, telling(outcome), job.refine)
     outcome.new_table(job.result(f"{job.setup.name or 'MocoInverse'}_solution.sto"), solution.trajectory.table())

@@ -7,6 +7,7 @@ ground.
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -208,38 +209,33 @@ def _of_muscle(motion: Motion, muscle: Any, path: str, of: Callable[[dict[str, A
 
 
 MUSCLES: dict[str, Callable[[dict[str, Array]], Array]] = {
-    "active_fiber_force": lambda found: found["ActiveFiberForce"],
-    "active_fiber_force_along_tendon": lambda found: found["ActiveFiberForceAlongTendon"],
-    "active_force_length_multiplier": lambda found: found["active_force_length"],
+    # What MuscleAnalysis has tables of, whose names are the same in other letters.
+    **{
+        name: itemgetter("".join(map(str.capitalize, name.split("_"))))
+        for name in (
+            "active_fiber_force", "active_fiber_force_along_tendon", "fiber_active_power", "fiber_force",
+            "fiber_length", "fiber_passive_power", "fiber_velocity", "normalized_fiber_length", "passive_fiber_force",
+            "passive_fiber_force_along_tendon", "pennation_angle", "pennation_angular_velocity", "tendon_force",
+            "tendon_length", "tendon_power",
+        )
+    },
+    "active_force_length_multiplier": itemgetter("active_force_length"),
     "cos_pennation_angle": lambda found: np.cos(found["PennationAngle"]),
-    "fiber_active_power": lambda found: found["FiberActivePower"],
-    "fiber_force": lambda found: found["FiberForce"],
     "fiber_force_along_tendon": lambda found: found["FiberForce"] * np.cos(found["PennationAngle"]),
-    "fiber_length": lambda found: found["FiberLength"],
     "fiber_length_along_tendon": lambda found: found["FiberLength"] * np.cos(found["PennationAngle"]),
-    "fiber_passive_power": lambda found: found["FiberPassivePower"],
-    "fiber_velocity_along_tendon": lambda found: found["along"],
-    "fiber_velocity": lambda found: found["FiberVelocity"],
-    "force_velocity_multiplier": lambda found: found["force_velocity"],
-    "muscle_power": lambda found: found["MuscleActuatorPower"],
-    "normalized_fiber_length": lambda found: found["NormalizedFiberLength"],
-    "normalized_fiber_velocity": lambda found: found["NormFiberVelocity"],
+    "fiber_velocity_along_tendon": itemgetter("along"),
+    "force_velocity_multiplier": itemgetter("force_velocity"),
+    "muscle_power": itemgetter("MuscleActuatorPower"),
+    "normalized_fiber_velocity": itemgetter("NormFiberVelocity"),
     "passive_fiber_damping_force": lambda found: found["PassiveFiberForce"] - found[SPRING],
     "passive_fiber_damping_force_along_tendon": lambda found: (
         (found["PassiveFiberForce"] - found[SPRING]) * np.cos(found["PennationAngle"])
     ),
-    "passive_fiber_elastic_force": lambda found: found[SPRING],
+    "passive_fiber_elastic_force": itemgetter(SPRING),
     "passive_fiber_elastic_force_along_tendon": lambda found: found[SPRING] * np.cos(found["PennationAngle"]),
-    "passive_fiber_force": lambda found: found["PassiveFiberForce"],
-    "passive_fiber_force_along_tendon": lambda found: found["PassiveFiberForceAlongTendon"],
-    "pennation_angle": lambda found: found["PennationAngle"],
-    "pennation_angular_velocity": lambda found: found["PennationAngularVelocity"],
-    "tendon_force": lambda found: found["TendonForce"],
-    "tendon_length": lambda found: found["TendonLength"],
     "tendon_strain": lambda found: found["TendonLength"] / found["slack"] - 1.0,
     "tendon_velocity": lambda found: found["rate"] - found["along"],
-    "tendon_power": lambda found: found["TendonPower"],
-}
+}  # fmt: skip
 """The outputs of muscles whose classes were held to OpenSim's."""
 LAWS = {
     "active_force_length_multiplier": "active_force_length",

@@ -11,11 +11,10 @@ from osimlite.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.schema.tools.tracking import RRATool
-from osimlite.simulation.static_optimization import StaticOptimization
 from osimlite.text import did_you_mean
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
-from osimlite.tools.through_time import simulation_of, told_model
+from osimlite.tools.through_time import sharing_of, simulation_of, told_model
 from osimlite.tools.tracked import RESIDUALS, average_residuals, model_file, residual_words, track
 from osimlite.tools.tracking import Desired
 
@@ -82,14 +81,7 @@ def _averages(job: Job, model: Model, desired: Desired) -> list[float]:
     """Averages of the residuals that the motion takes as it was measured, in the time of the setup."""
     setup: RRATool = job.setup
     mechanism: Mechanism = build_mechanism(model, opensim_derivatives=True)
-    sharing = StaticOptimization(
-        model,
-        mechanism,
-        muscles="isometric",
-        external_loads=job.path("external_loads_file"),
-        folder=job.needed("model_file").parent,
-        early_return=True,
-    )
+    sharing = sharing_of(job, model, mechanism, muscles="isometric")
     given = setup.initial_time_for_com_adjustment, setup.final_time_for_com_adjustment
     own = max(setup.initial_time, desired.start), min(setup.final_time, desired.end)
     first, last = own if given == (-1.0, -1.0) else given

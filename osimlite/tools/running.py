@@ -22,8 +22,7 @@ from osimlite.lint.suffixes import is_table
 from osimlite.multibody.extremes import any_numbers
 from osimlite.schema.registry import MODULES
 from osimlite.text import counted, listed
-from osimlite.tools.job import Job
-from osimlite.tools.not_runnable import NotRunnable
+from osimlite.tools.job import Job, NotRunnable
 from osimlite.tools.outcome import Outcome
 
 IGNORED = ("OSIM101",)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite._load import module_name
+from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.records import replace
 from osimlite.schema.actuators import Actuator
@@ -19,15 +20,16 @@ from osimlite.schema.controller_types import CorrectionController, PrescribedCon
 from osimlite.schema.model import Model
 from osimlite.schema.specs import file_specs
 from osimlite.schema.tools.dynamics import AbstractTool
+from osimlite.simulation.files.recorded import RecordedMotion
 from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.simulation.recorded import add_forces
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.start import columns_of_states, starting
+from osimlite.simulation.static_optimization import StaticOptimization
 from osimlite.text import listed
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.job import Job
 from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.not_runnable import NotRunnable
 from osimlite.tools.outcome import Outcome
 
 _ANALYSES = "osimlite.tools.analyses"
@@ -49,8 +51,7 @@ def analyses_of(job: Job) -> Analyses:
             tag = type(item).__name__
             name = f"{_ANALYSES}.{module_name(tag)}"
             if find_spec(name) is None:
-                message = f"the analysis '{item.name}' is a {tag}, which cannot be computed yet"
-                raise NotRunnable(message, file=str(job.file))
+                raise job.unable(f"the analysis '{item.name}' is a {tag}, which cannot be computed yet")
             result.append((item, import_module(name)))
     return result
 
@@ -98,10 +99,9 @@ def told_model(job: Job) -> Model:
         model.controller_set.objects.append(own)
     for controller in model.components(CorrectionController):
         if controller.enabled:
-            message = (
+            raise job.unable(
                 f"'{controller.name}', a CorrectionController, cannot be computed yet; say <enabled>false</enabled>"
             )
-            raise NotRunnable(message, file=str(job.file))
     return model
 
 
@@ -125,6 +125,30 @@ def simulation_of(job: Job, model: Model) -> Simulation:
         opensim_derivatives=True,
         simbody_early_return=True,
     )
+
+
+def sharing_of(job: Job, model: Model, mechanism: Mechanism, **choices: Any) -> StaticOptimization:
+    """What shares the forces of a motion among the actuators of the model of a setup under its loads, as OpenSim."""
+    return StaticOptimization(
+        model,
+        mechanism,
+        external_loads=job.path("external_loads_file"),
+        folder=job.needed("model_file").parent,
+        early_return=True,
+        **choices,
+    )
+
+
+def constrained(recorded: RecordedMotion, speeds: Array, simulation: Simulation, model: Model) -> tuple[Array, Array]:
+    """Values and speeds (t, n) of a motion that fulfil the constraints: the speeds those alone that are prescribed."""
+    if not simulation.constraints:
+        return recorded.values, speeds
+    recorded = recorded.assembled()
+    if not model.constraint_set.objects:
+        # Only then OpenSim changes the speeds.
+        moments = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
+        speeds = np.array([recorded.mechanism.project_speeds(q, u, time) for time, q, u in moments])
+    return recorded.values, speeds
 
 
 class StateRows(NamedTuple):

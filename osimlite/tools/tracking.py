@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,11 +18,11 @@ from osimlite.schema.tools.tracking import CMC_Joint, CMC_TaskSet, CMCTool, RRAT
 from osimlite.simulation.files.recorded import RecordedMotion
 from osimlite.simulation.lowpass import continued, lowpassed_by_sinc
 from osimlite.simulation.run import Simulation
-from osimlite.simulation.static_optimization import StaticOptimization, least_effort
+from osimlite.simulation.static_optimization import least_effort
 from osimlite.text import did_you_mean, listed
-from osimlite.tools.job import Job
-from osimlite.tools.not_runnable import NotRunnable
+from osimlite.tools.job import Job, NotRunnable
 from osimlite.tools.outcome import Outcome
+from osimlite.tools.through_time import constrained, sharing_of
 
 PADDING, ORDER = 60, 50
 """Rows that OpenSim adds at both ends of the motion, and the order of its filter."""
@@ -66,8 +66,7 @@ class Desired:
         """
         setup: RRATool | CMCTool = job.setup
         if job.path("desired_points_file") is not None:
-            message = "desired_points_file is given, and points cannot be followed yet; leave it empty"
-            raise NotRunnable(message, file=str(job.file))
+            raise job.unable("desired_points_file is given, and points cannot be followed yet; leave it empty")
         mechanism = simulation.mechanism
         recorded = RecordedMotion.read(mechanism, job.needed("desired_kinematics_file"))
         if recorded.missing:
@@ -79,7 +78,8 @@ class Desired:
         if setup.lowpass_cutoff_frequency >= 0.0:
             times, values = lowpassed_by_sinc(times, values, setup.lowpass_cutoff_frequency, ORDER)
         padded = replace(recorded, times=times, values=values)
-        values, speeds = constrained(padded, simulation, model)
+        # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints change the values.
+        values, speeds = constrained(padded, padded.rates[0], simulation, model)
         (accelerations,) = derivatives_of_samples(times, speeds, times, (1,))
         return cls(start, end, times, values, speeds, accelerations)
 
@@ -101,22 +101,6 @@ class Desired:
         q, rates = self._curves[0].derivatives(moments, (0, 1))
         (others,) = self._curves[1].derivatives(moments, (0,))
         return np.stack([q, rates, *np.split(others, 2, axis=1)], axis=1)
-
-
-def constrained(recorded: RecordedMotion, simulation: Simulation, model: Model) -> tuple[Array, Array]:
-    """Values and speeds (t, n) of a motion; the values fulfil the constraints.
-
-    OpenSim takes the rates of coordinates for the speeds, as they are before the constraints change the values.
-    """
-    speeds = recorded.rates[0]
-    if not simulation.constraints:
-        return recorded.values, speeds
-    recorded = recorded.assembled()
-    if not model.constraint_set.objects:
-        # Then OpenSim has the speeds fulfil what is prescribed, too.
-        moments = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
-        speeds = np.array([recorded.mechanism.project_speeds(q, u, time) for time, q, u in moments])
-    return recorded.values, speeds
 
 
 class Task(NamedTuple):
@@ -222,13 +206,8 @@ class Sharing:
 
     def __init__(self, job: Job, model: Model, mechanism: Mechanism, tasks: Tasks, exact: bool) -> None:
         self.tasks, self.exact, self.mechanism = tasks, exact, mechanism
-        choices: dict[str, Any] = {
-            "external_loads": job.path("external_loads_file"),
-            "folder": job.needed("model_file").parent,
-            "early_return": True,
-        }
-        self._unit = StaticOptimization(model, mechanism, muscles="isometric", **choices)
-        self._strong = StaticOptimization(model, mechanism, **choices) if exact else None
+        self._unit = sharing_of(job, model, mechanism, muscles="isometric")
+        self._strong = sharing_of(job, model, mechanism) if exact else None
         self.names = self._unit.names
         self.optimal = self._unit.optimal_forces
         if not self.optimal.all():

@@ -15,7 +15,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import Millard2012AccelerationMuscle
 from osimlite.schema.outputs import outputs_of
 from osimlite.simulation.files.storage import read_sto
-from osimlite.tools.not_runnable import NotRunnable
+from osimlite.tools.job import NotRunnable
 from osimlite.tools.outputs import LAWS
 from tests.oracle.test_muscle_analysis import with_muscles_of
 from tests.oracle.test_run_tools import both, real

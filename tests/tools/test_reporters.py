@@ -19,7 +19,7 @@ from osimlite.schema.muscles import Muscle, RigidTendonMuscle
 from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated
 from osimlite.schema.probe_types import ActuatorPowerProbe
 from osimlite.simulation.files.storage import StoTable, write_sto
-from osimlite.tools.not_runnable import NotRunnable
+from osimlite.tools.job import NotRunnable
 
 SETUP = """<OpenSimDocument Version="40600">
     <AnalyzeTool name="it">

@@ -10,7 +10,7 @@ import pytest
 
 import osimlite
 from osimlite.simulation.files.storage import StoTable, read_sto
-from osimlite.tools.not_runnable import NotRunnable
+from osimlite.tools.job import NotRunnable
 
 ACTIVATION, FORCE = "walk_StaticOptimization_activation.sto", "walk_StaticOptimization_force.sto"
 

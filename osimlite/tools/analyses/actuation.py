@@ -9,7 +9,6 @@ from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.tools.analyses import Actuation
 from osimlite.simulation.files.old_storage import UNITS
 from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.not_runnable import NotRunnable
 
 _DESCRIPTION = (
     "\nThis file contains either the forces, speeds, or powers developed\n"
@@ -29,10 +28,10 @@ def compute(analysis: Actuation, motion: Motion, tables: Tables) -> None:
     actuators = [item for item in motion.model.force_set.objects if isinstance(item, Actuator) and item.appliesForce]
     for item in actuators:
         if item.control_count != 1:
-            message = (
-                f"'{analysis.name}' asks for one force of '{item.name}', a {type(item).__name__}, which has several"
+            raise tables.job.unable(
+                f"'{analysis.name}' asks for one force of '{item.name}', a {type(item).__name__}, which has several; "
+                "OpenSim crashes there"
             )
-            raise NotRunnable(f"{message}; OpenSim crashes there", file=str(tables.job.file))
     tree = motion.model.tree()
     known = motion.known([tree.path_of(item) or "" for item in actuators], "actuation", "speed")
     force, speed = known["actuation"], known["speed"]

@@ -19,7 +19,6 @@ from osimlite.simulation.static_optimization import ideal
 from osimlite.text import counted, did_you_mean, listed
 from osimlite.tools.joint_wrenches import JointWrenches
 from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.not_runnable import NotRunnable
 from osimlite.tools.through_time import simulation_of
 
 _TITLE = "Joint Reaction Loads"
@@ -121,8 +120,9 @@ def _overridden(analysis: JointReaction, motion: Motion, tables: Tables) -> tupl
     for item in actuators:
         other = ideal(item, 1.0)
         if other is None or id(item) not in places:
-            message = f"the {type(item).__name__} '{item.name}' cannot push as '{path}' says, which is not done yet"
-            raise NotRunnable(message, file=str(tables.job.file))
+            raise tables.job.unable(
+                f"the {type(item).__name__} '{item.name}' cannot push as '{path}' says, which is not done yet"
+            )
         model.force_set.objects[places[id(item)]] = other
     simulation = simulation_of(tables.job, model)
     forces = {item.name: (table.times, table[item.name]) for item in actuators}

@@ -12,7 +12,6 @@ from osimlite.simulation.files.old_storage import UNITS
 from osimlite.simulation.paths import Paths
 from osimlite.tools.motion import Motion, Tables
 from osimlite.tools.muscle_quantities import CHECKED, KNOWN, OF_DYNAMICS, quantities
-from osimlite.tools.not_runnable import NotRunnable
 
 _DESCRIPTION = (
     "\nThis analysis gathers basic information about muscles during a simulation "
@@ -29,8 +28,7 @@ def compute(analysis: MuscleAnalysis, motion: Motion, tables: Tables) -> None:
         why = "which it cannot analyse yet" if type(muscle) not in CHECKED else ""
         why = why or ("" if muscle.appliesForce else "which applies no force")
         if why:
-            message = f"'{analysis.name}' asks for '{muscle.name}', a {type(muscle).__name__}, {why}"
-            raise NotRunnable(message, file=str(tables.job.file))
+            raise tables.job.unable(f"'{analysis.name}' asks for '{muscle.name}', a {type(muscle).__name__}, {why}")
     names = [muscle.name for muscle in muscles]
     result = _of_all(motion, muscles)
     if not motion.mechanism.total_mass > np.finfo(float).eps:

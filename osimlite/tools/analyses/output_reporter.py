@@ -11,7 +11,6 @@ from osimlite.schema.outputs import outputs_of
 from osimlite.schema.tools.analyses import OutputReporter
 from osimlite.text import did_you_mean, listed
 from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.not_runnable import NotRunnable
 from osimlite.tools.outputs import reader_of
 
 FILES = {"double": "Outputs", "Vec3": "OutputsVec3", "SpatialVec": "OutputsSpatialVec"}
@@ -42,10 +41,9 @@ def compute(analysis: OutputReporter, motion: Motion, tables: Tables) -> None:
             near = did_you_mean(parts["output"], outputs)
             raise tables.job.error(f"'{path}' has no output '{parts['output']}' for '{analysis.name}'{near}")
         if reader is None or parts["channel"]:
-            message = (
+            raise tables.job.unable(
                 f"'{analysis.name}' asks for '{asked}' of a {type(component).__name__}, which cannot be computed yet"
             )
-            raise NotRunnable(message, file=str(tables.job.file))
         columns[kind].append(parts["alias"] or f"{path}|{parts['output']}")
         rows[kind].append(reader(motion, component, path))
     if left_out:

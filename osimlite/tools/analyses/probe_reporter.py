@@ -9,7 +9,6 @@ from osimlite.schema.tools.analyses import ProbeReporter
 from osimlite.simulation.files.old_storage import DEGREES
 from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.not_runnable import NotRunnable
 
 _DESCRIPTION = (
     "\nThis file contains the probes on a model during a simulation.\n"
@@ -23,8 +22,9 @@ def compute(analysis: ProbeReporter, motion: Motion, tables: Tables) -> None:
     computed = {probe.path for probe in engine.probes}
     for probe in motion.model.components(Probe):
         if probe.enabled and tree.path_of(probe) not in computed:
-            message = f"'{analysis.name}' asks for '{probe.name}', a {type(probe).__name__} that cannot be computed"
-            raise NotRunnable(message, file=str(tables.job.file))
+            raise tables.job.unable(
+                f"'{analysis.name}' asks for '{probe.name}', a {type(probe).__name__} that cannot be computed"
+            )
     rows = np.array(list(probe_rows(engine, [*motion.moments], motion.steps))).reshape(len(motion.times), -1)
     # Components with outputs are reported in a run, and not here.
     shown = [issubclass(probe.component, Probe) for probe in engine.probes for _ in probe.reading.labels]

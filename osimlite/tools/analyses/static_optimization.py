@@ -4,34 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.schema.tools.analyses import StaticOptimization as Setup
+from osimlite.schema.tools.analyses import StaticOptimization
 from osimlite.simulation.files.control_nodes import control_set
-from osimlite.simulation.static_optimization import Shared, StaticOptimization
+from osimlite.simulation.static_optimization import Shared
 from osimlite.tools.analyses.force_reporter import DESCRIPTION
 from osimlite.tools.motion import Motion, Tables
-from osimlite.tools.not_runnable import NotRunnable
+from osimlite.tools.through_time import sharing_of
 
 _DESCRIPTION = "This file contains static optimization results.\n"
 
 
-def compute(analysis: Setup, motion: Motion, tables: Tables) -> None:
+def compute(analysis: StaticOptimization, motion: Motion, tables: Tables) -> None:
     """Write activations, forces and controls; what has no solution is no number there, and told."""
     job = tables.job
     if motion.record is None:
-        message = f"'{analysis.name}' cannot be computed of a motion that was not measured; give it to an AnalyzeTool"
-        raise NotRunnable(message, file=str(job.file))
+        raise job.unable(
+            f"'{analysis.name}' cannot be computed of a motion that was not measured; give it to an AnalyzeTool"
+        )
     if not analysis.use_model_force_set:
-        message = f"'{analysis.name}' has use_model_force_set off, with which OpenSim crashes; set it to true"
-        raise NotRunnable(message, file=str(job.file))
-    problem = StaticOptimization(
-        motion.model,
-        motion.mechanism,
-        exponent=analysis.activation_exponent,
-        muscles="active" if analysis.use_muscle_physiology else "isometric",
-        external_loads=job.path("external_loads_file"),
-        folder=job.needed("model_file").parent,
-        early_return=True,
-    )
+        raise job.unable(f"'{analysis.name}' has use_model_force_set off, with which OpenSim crashes; set it to true")
+    muscles = "active" if analysis.use_muscle_physiology else "isometric"
+    problem = sharing_of(job, motion.model, motion.mechanism, exponent=analysis.activation_exponent, muscles=muscles)
     shared = problem.share(motion.times, motion.values, motion.speeds, motion.wanted)
     forces = problem.records(shared, motion.values, motion.speeds)
     activations = shared.table()
