@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 from typing import NamedTuple
 
@@ -157,6 +157,10 @@ class Draft:
         """The model, if the document holds one."""
         return self.root.find("Model")
 
+    def of_model(self, tag: str) -> list[tuple[Element, Element]]:
+        """The model and its first child with a tag, or nothing: for whoever does something if both are there."""
+        return [] if self.model is None else [*having([self.model], tag)]
+
     def every(self, *kinds: str) -> list[Element]:
         """Every element of the classes named or of classes derived from them, in document order.
 
@@ -251,6 +255,14 @@ def members(owner: Element) -> Iterator[Element]:
     objects = owner.find("objects")
     if objects is not None:
         yield from (child for child in objects if isinstance(child.tag, str))
+
+
+def having(owners: Iterable[Element], tag: str) -> Iterator[tuple[Element, Element]]:
+    """Elements, each with its first child of a tag; those without one are left out."""
+    for owner in owners:
+        child = owner.find(tag)
+        if child is not None:
+            yield owner, child
 
 
 def elements(parent: Element) -> list[Element]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.document.upgrade.draft import Draft, Element, elements, reals, step, text_of
+from osimlite.document.upgrade.draft import Draft, Element, elements, having, plain, reals, step, text_of
 
 _POINT = ("XAttachment", "YAttachment", "ZAttachment")
 
@@ -14,10 +14,9 @@ def scale_factors(draft: Draft) -> None:
     Along an axis that is none of x, y, z the factors count as far as the axis goes that way, as OpenSim scales now. A
     translation without a function, or one equal to its coordinate, is not scaled.
     """
-    for joint in draft.tagged("CustomJoint"):
-        factors = joint.find("scale_factors")
-        scales = reals(text_of(joint, "scale_factors"), 3)
-        if factors is None or scales is None:
+    for joint, factors in having(draft.tagged("CustomJoint"), "scale_factors"):
+        scales = reals(plain(factors), 3)
+        if scales is None:
             continue
         for axis in joint.iter("TransformAxis"):
             direction = reals(text_of(axis, "axis"), 3)
@@ -26,10 +25,9 @@ def scale_factors(draft: Draft) -> None:
                 _multiply(draft, axis.find("function"), x + y + z, factors)
         draft.changed(joint, at=factors)
         draft.remove(factors)
-    for point in draft.tagged("MovingPathPoint"):
-        factors = point.find("scale_factors")
-        scales = reals(text_of(point, "scale_factors"), 3)
-        if factors is None or scales is None:
+    for point, factors in having(draft.tagged("MovingPathPoint"), "scale_factors"):
+        scales = reals(plain(factors), 3)
+        if scales is None:
             continue
         for tag, scale in zip(_POINT, scales, strict=True):
             _multiply(draft, point.find(tag), scale, factors)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.document.upgrade.draft import Draft, Element, Refused, is_true, members, reals, step, text_of
+from osimlite.document.upgrade.draft import Draft, Element, Refused, having, is_true, members, reals, step, text_of
 from osimlite.forces.vectors import Vector, cross, norm, vector
 
 _UNIT = ("1 0 0", "0 1 0", "0 0 1")
@@ -11,10 +11,7 @@ _UNIT = ("1 0 0", "0 1 0", "0 0 1")
 @step(below=10901)
 def transform_axes(draft: Draft) -> None:
     """<TransformAxisSet> becomes a <SpatialTransform> of six axes."""
-    for joint in draft.tagged("CustomJoint"):
-        old = joint.find("TransformAxisSet")
-        if old is None:
-            continue
+    for joint, old in having(draft.tagged("CustomJoint"), "TransformAxisSet"):
         given: dict[str, list[Element]] = {"rotation": [], "translation": []}
         for axis in members(old):
             given["rotation" if is_true(text_of(axis, "is_rotation") or "") else "translation"].append(axis)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from osimlite.document.upgrade.draft import Draft, reals, step, text_of
+from osimlite.document.upgrade.draft import Draft, having, reals, step, text_of
 
 
 @step(below=20101)
 def geometry_files(draft: Draft) -> None:
     """Every file in <geometry_files> becomes a <Mesh> of its own."""
-    for body in draft.tagged("Body", "Ground"):
-        visible = body.find("VisibleObject")
-        if visible is None:
-            continue
+    for body, visible in having(draft.tagged("Body", "Ground"), "VisibleObject"):
         attached = draft.add(body, "attached_geometry", source=visible)
         files = visible.find("geometry_files")
         source = visible if files is None else files

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.document.upgrade.draft import Draft, Element, elements, members, plain, step
+from osimlite.document.upgrade.draft import Draft, Element, elements, having, members, plain, step
 
 _KEPT_BY_GROUND = {"VisibleObject", "WrapObjectSet", "attached_geometry", "components", "geometry"}
 
@@ -10,42 +10,30 @@ _KEPT_BY_GROUND = {"VisibleObject", "WrapObjectSet", "attached_geometry", "compo
 @step(below=30501)
 def ground(draft: Draft) -> None:
     """The body called ground becomes the model's <Ground>."""
-    model = draft.model
-    bodies = None if model is None else model.find("BodySet")
-    if model is None or bodies is None:
-        return
-    for body in members(bodies):
-        if body.tag == "Body" and body.get("name") == "ground":
+    for model, bodies in draft.of_model("BodySet"):
+        body = next((body for body in members(bodies) if body.tag == "Body" and body.get("name") == "ground"), None)
+        if body is not None:
             for child in elements(body):
                 if child.tag not in _KEPT_BY_GROUND:
                     draft.remove(child)
             draft.rename(body, "Ground")
             draft.move(body, model)
             draft.changed(body)
-            return
 
 
 @step(below=30501)
 def joints(draft: Draft) -> None:
     """Joints leave their bodies for a <JointSet> of the model and name both frames."""
-    model = draft.model
-    bodies = None if model is None else model.find("BodySet")
-    if model is None or bodies is None:
-        return
-    joint_set = model.find("JointSet")
-    if joint_set is None:
-        joint_set = draft.add(model, "JointSet", source=bodies)
-    objects = draft.list_in(joint_set, "objects", source=joint_set)
-    for body in members(bodies):
-        wrapper = body.find("Joint")
-        if wrapper is None:
-            continue
-        result = elements(wrapper)
-        if result:
-            _settle(draft, result[0], body, objects)
-        for extra in result[1:]:
-            draft.changed(body, at=extra, lost=f"a second joint of the body, <{extra.tag}>")
-        draft.remove(wrapper)
+    for model, bodies in draft.of_model("BodySet"):
+        joint_set = draft.list_in(model, "JointSet", source=bodies)
+        objects = draft.list_in(joint_set, "objects", source=joint_set)
+        for body, wrapper in having(members(bodies), "Joint"):
+            result = elements(wrapper)
+            if result:
+                _settle(draft, result[0], body, objects)
+            for extra in result[1:]:
+                draft.changed(body, at=extra, lost=f"a second joint of the body, <{extra.tag}>")
+            draft.remove(wrapper)
 
 
 def _settle(draft: Draft, joint: Element, body: Element, objects: Element) -> None:

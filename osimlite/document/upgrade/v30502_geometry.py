@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from osimlite.document.upgrade.draft import Draft, Element, elements, members, plain, reals, step, text_of
+from osimlite.document.upgrade.draft import Draft, Element, elements, having, members, plain, reals, step, text_of
 from osimlite.document.upgrade.rotation import compose
 
 
 @step(below=30502)
 def display_geometry(draft: Draft) -> None:
     """Each <DisplayGeometry> becomes a <Mesh>, in a frame of its own if it stands off the body."""
-    for body in draft.tagged("Body", "Ground"):
-        visible = body.find("VisibleObject")
-        if visible is None:
-            continue
+    for body, visible in having(draft.tagged("Body", "Ground"), "VisibleObject"):
         shown = visible.find("GeometrySet")
         if shown is not None and shown.find("objects") is not None:
             attached = draft.add(body, "attached_geometry", source=shown)

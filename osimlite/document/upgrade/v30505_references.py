@@ -111,10 +111,8 @@ def _path_by_opensim(draft: Draft, name: str) -> str:
 def _coordinate_paths(draft: Draft) -> dict[str, str]:
     """The path of the first coordinate of each name; joints of the same name are told apart as OpenSim does."""
     paths: dict[str, str] = {}
-    model = draft.model
-    joint_set = None if model is None else model.find("JointSet")
     taken: set[str] = set()
-    for joint in () if joint_set is None else members(joint_set):
+    for joint in (joint for _, joint_set in draft.of_model("JointSet") for joint in members(joint_set)):
         name = joint.get("name") or joint.tag.lower()
         free = unused(name, taken, 0)
         taken.add(free)

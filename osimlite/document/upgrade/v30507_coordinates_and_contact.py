@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from osimlite.document.upgrade.draft import Draft, members, plain, step, text_of
+from osimlite.document.upgrade.draft import Draft, having, members, plain, step, text_of
 
 
 @step(below=30507)
 def joint_coordinates(draft: Draft) -> None:
     """The <CoordinateSet> of a joint becomes its <coordinates>."""
-    for joint in draft.every("Joint"):
-        old = joint.find("CoordinateSet")
-        if old is None:
-            continue
+    for joint, old in having(draft.every("Joint"), "CoordinateSet"):
         # Also what is no coordinate, so that the reader can say so.
         coordinates = list(members(old))
         if coordinates:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.document.upgrade.draft import Draft, is_true, plain, step
+from osimlite.document.upgrade.draft import Draft, having, is_true, plain, step
 
 
 @step(below=30509)
@@ -19,9 +19,7 @@ def probes_switched_on(draft: Draft) -> None:
 
 
 def _turn_round(draft: Draft, family: str, new: str) -> None:
-    for component in draft.every(family):
-        switch = component.find("isDisabled")
-        if switch is not None:
-            switch.text = "false" if is_true(plain(switch)) else "true"
-            draft.rename(switch, new)
-            draft.changed(component)
+    for component, switch in having(draft.every(family), "isDisabled"):
+        switch.text = "false" if is_true(plain(switch)) else "true"
+        draft.rename(switch, new)
+        draft.changed(component)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.document.upgrade.draft import Draft, Element, plain, step, text_of
+from osimlite.document.upgrade.draft import Draft, Element, having, plain, step, text_of
 
 _COLORS = {"Muscle": ".8 .1 .1", "Ligament": "0 1 0"}
 """The colour of a path that says none, by what the path is of."""
@@ -12,10 +12,7 @@ _COLORS = {"Muscle": ".8 .1 .1", "Ligament": "0 1 0"}
 def path_appearance(draft: Draft) -> None:
     """Colour and display preference of a path become its <Appearance>; muscles are red, ligaments green."""
     usual = {
-        path: color
-        for family, color in _COLORS.items()
-        for owner in draft.every(family)
-        if (path := owner.find("GeometryPath")) is not None
+        path: color for family, color in _COLORS.items() for _, path in having(draft.every(family), "GeometryPath")
     }
     for path in draft.tagged("GeometryPath"):
         color = path.find("default_color")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from osimlite.document.upgrade.draft import Draft, Element, elements, members, path_of, plain, step
+from osimlite.document.upgrade.draft import Draft, Element, elements, having, members, path_of, plain, step
 
 _SUFFIX = re.compile(r"((?:socket|input)_.*)_connectee_names?")
 
@@ -15,10 +15,7 @@ def connectors(draft: Draft) -> None:
 
     This and the next two come before the steps that write sockets, so that those find one spelling only.
     """
-    for component in draft.every("Component"):
-        old = component.find("connectors")
-        if old is None:
-            continue
+    for component, old in having(draft.every("Component"), "connectors"):
         if not all(re.fullmatch(r"\w+", connector.get("name", "")) for connector in elements(old)):
             continue
         # OpenSim puts each before those it has made already: of two for one socket the last counts.
@@ -57,10 +54,8 @@ def set_levels(draft: Draft) -> None:
 
     So they were written while version 4 was made; OpenSim 4.6 finds nothing there.
     """
-    model = draft.model
-    bodies = None if model is None else model.find("BodySet")
     paths = {"ground": "/ground"}
-    if bodies is not None:
+    for _, bodies in draft.of_model("BodySet"):
         paths.update((name, f"/bodyset/{name}") for body in members(bodies) if (name := body.get("name")))
     for component in draft.every("Component"):
         for child in elements(component):

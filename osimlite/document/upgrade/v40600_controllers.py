@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.document.lexical import split
-from osimlite.document.upgrade.draft import Draft, members, path_of, plain, step
+from osimlite.document.upgrade.draft import Draft, having, members, path_of, plain, step
 
 
 @step(below=40600)
@@ -14,7 +14,7 @@ def controller_actuators(draft: Draft) -> None:
     """
     if next(draft.root.iter("actuator_list"), None) is None:
         return
-    listed = [c for c in draft.every("Controller") if c.find("actuator_list") is not None]
+    listed = [*having(draft.every("Controller"), "actuator_list")]
     if not listed:
         return
     actuators = [(path_of(actuator), actuator.get("name", "")) for actuator in draft.every("Actuator")]
@@ -26,9 +26,7 @@ def controller_actuators(draft: Draft) -> None:
     by_name: dict[str, str] = {}
     for path, name in (*actuators, *forces):
         by_name.setdefault(name, path)
-    for controller in listed:
-        names = controller.find("actuator_list")
-        assert names is not None
+    for controller, names in listed:
         words = split(plain(names))
         lost = None
         if any(word.lower() == "all" for word in words):
