@@ -161,16 +161,26 @@ def _one(read: Callable[[str], Any], optional: bool, legacy: bool) -> Callable[[
             raise Unclean("empty", "")
         if len(words) == 1:
             return read(words[0])
-        for word in words[1:] if not legacy else ():
+        if not legacy:
             # OpenSim reads them all before it takes the first, and takes none if it cannot read one.
-            try:
-                read(word)
-            except Unclean as unclean:
-                if unclean.value is ABSENT:
-                    raise
+            _as_read(words[1:], read)
         raise Unclean("too-many", raw.strip(), read(words[0]))
 
     return convert
+
+
+def _as_read(words: list[str], read: Callable[[str], Any]) -> tuple[list[Any], Unclean | None]:
+    """What OpenSim reads of words, and the first that it cuts; Unclean if it can make nothing of one."""
+    values, first = [], None
+    for word in words:
+        try:
+            values.append(read(word))
+        except Unclean as unclean:
+            if unclean.value is ABSENT:
+                raise
+            values.append(unclean.value)
+            first = first or unclean
+    return values, first
 
 
 def _exactly(size: int) -> Callable[[str], Any]:
@@ -188,18 +198,9 @@ def _exactly(size: int) -> Callable[[str], Any]:
             raise Unclean("too-few", raw.strip())
         if len(words) % size:
             raise Unclean("too-many", raw.strip())
-        cleanly = []
-        cut: str | None = None
-        for word in words:
-            try:
-                cleanly.append(real(word))
-            except Unclean as unclean:
-                if unclean.value is ABSENT:
-                    raise
-                cleanly.append(unclean.value)
-                cut = cut or word
-        if cut is not None:
-            raise Unclean("unreadable", cut, tuple(cleanly[:size]))
+        cleanly, first = _as_read(words, real)
+        if first is not None:
+            raise Unclean("unreadable", first.word, tuple(cleanly[:size]))
         if len(words) > size:
             raise Unclean("too-many", raw.strip(), tuple(cleanly[:size]))
         return tuple(cleanly)
@@ -217,19 +218,7 @@ def _words(read: Callable[[str], Any], least: int, most: int | None) -> Callable
                     return numbers
             except ValueError:
                 pass
-        first: Unclean | None = None
-        if read is str:
-            values: list[Any] = list(words)
-        else:
-            values = []
-            for word in words:
-                try:
-                    values.append(read(word))
-                except Unclean as unclean:
-                    if unclean.value is ABSENT:
-                        raise
-                    values.append(unclean.value)
-                    first = first or unclean
+        values, first = (words, None) if read is str else _as_read(words, read)
         if len(values) < least:
             raise Unclean("too-few" if values else "empty", raw.strip())
         if first is not None:
