@@ -29,6 +29,8 @@ CONTROLLERS = "GaitStateController", "ReflexController", FEED_FORWARD, COMPOSITE
 """What is done here, and besides noise within a CompositeController."""
 CONDITIONAL, OTHER = "ConditionalMuscleReflex", "_o"
 """A kind of reflexes that have a gate; the end of names of what is on the other side."""
+LONGEST = 10.0
+"""Delay, s."""
 NEVER = -1.0
 """A threshold that has no effect."""
 LARGEST_SEED = 10**15
@@ -274,6 +276,8 @@ class Reflexes:
         delay = parameters.of(node, "delay", 0.0, before + "delay")
         if np.any(delay < 0.0):
             raise node.error(f"a delay of {delay.min():g} s knows what is to come")
+        if not np.all(delay <= LONGEST):
+            raise node.error(f"a delay of {delay.max():g} s is more than {LONGEST:g} s, the longest that is remembered")
         return delay
 
     def _sensor(self, source: Source) -> int:

@@ -16,7 +16,7 @@ from osimlite.kernels.reflexes import LIMITS, TERM
 from osimlite.kernels.senses import SENSED
 from osimlite.reflexes.controllers import CONTROLLERS, Reflexes
 from osimlite.reflexes.parameters import AUTO, Parameter, Parameters, par_line, read_par
-from osimlite.reflexes.scenario import OPTIMIZERS, begun, legs_of
+from osimlite.reflexes.scenario import OPTIMIZERS, begun, control_step, legs_of
 from osimlite.reflexes.settings import Node, read_settings, settings_of
 from osimlite.reflexes.walkers import Felt
 from osimlite.schema.model import Model
@@ -59,9 +59,7 @@ class Feedback:
         if found is None:
             raise holder.error(f"a controller is needed: {listed(list(CONTROLLERS))}")
         self._kind, self._node = found
-        self.step, self._legs = model.number("fixed_control_step_size", 0.005), legs_of(model)
-        if not self.step > 0.0:
-            raise model.error(f"a control step of {self.step:g} s is none; fixed_control_step_size is to be positive")
+        self.step, self._legs = control_step(model), legs_of(model)
         known = {name: best for name, (best, _, _) in begun(optimizer, folder).items()}
         if isinstance(values, str | Path):
             values = {name: best for name, (best, _, _) in read_par(values).items()}
@@ -80,8 +78,9 @@ class Feedback:
 
     def gains(self, model: Model, engine: Any) -> list[Gain]:
         """The parameters, for a model with its engine."""
-        _, _, found = self._read(model, engine)
-        return [Gain(each.name, self._values.get(each.name, each.mean), each.low, each.high) for each in found.values()]
+        _, _, parameters = self._read(model, engine)
+        found, values = parameters.found.values(), self._values
+        return [Gain(each.name, values.get(each.name, each.mean), each.low, each.high) for each in found]
 
     def with_values(self, values: Mapping[str, float]) -> Self:
         """The same with other values of some parameters."""
@@ -93,13 +92,13 @@ class Feedback:
         """The values of parameters that are given, as a file (.par)."""
         return "".join(par_line(Parameter(name, x, AUTO * abs(x), 0.0, 0.0), x) for name, x in self._values.items())
 
-    def _read(self, model: Model, engine: Any) -> tuple[Felt, Reflexes, dict[str, Parameter]]:
+    def _read(self, model: Model, engine: Any) -> tuple[Felt, Reflexes, Parameters]:
         felt, parameters = Felt(model, engine, 1, self.step, self._legs), Parameters(self._values)
         reflexes = Reflexes(self._node, self._kind, felt, parameters)
         for name in self._values:
             if name not in parameters.found and name not in self._begun:
                 raise SettingError(f"the controller has no parameter '{name}'{or_known(name, parameters.found)}")
-        return felt, reflexes, parameters.found
+        return felt, reflexes, parameters
 
     def held(self, model: Model, engine: Any) -> Held:
         """What the kernels go by, for a model with its engine.
@@ -107,7 +106,7 @@ class Feedback:
         Raises:
             OsimliteError: the model has not what a reflex names, or a value belongs to no parameter.
         """
-        felt, reflexes, _ = self._read(model, engine)
+        felt, reflexes, parameters = self._read(model, engine)
         plan, numbers = reflexes.compiled()
         # What no reflex names, and no noise, is left to others.
         everything, is_noisy = np.arange(len(felt.names)), numbers[0, LIMITS.CONTROL_NOISE] > 0.0
@@ -123,4 +122,5 @@ class Feedback:
             known,
             plan,
             numbers,
+            parameters.told,
         )

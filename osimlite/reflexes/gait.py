@@ -24,6 +24,7 @@ class Strides(NamedTuple):
 
     Attributes:
         number: of strides of both legs.
+        touches: of the ground by both feet, the first ones included; SCONE counts scuffs among its steps, too.
         time, length: of one, s and m, on average.
         stance: part of a stride in which a foot is on the ground; left, right.
         both: part of the time in which both are.
@@ -39,6 +40,7 @@ class Strides(NamedTuple):
     both: float
     humps: tuple[float, ...]
     peak: float
+    touches: int
 
 
 class Gait(NamedTuple):
@@ -66,7 +68,9 @@ class Gait(NamedTuple):
         if self.strides is not None:
             each = self.strides
             left, right = (100.0 * part for part in each.stance)
-            words["strides"] = f"{each.number}, of {each.time:.3f} s and {each.length:.3f} m"
+            words["strides"] = (
+                f"{each.number}, of {each.time:.3f} s and {each.length:.3f} m; {each.touches} steps without scuffs"
+            )
             words["stance"] = f"{left:.1f} % of a stride left, {right:.1f} % right; both feet {100.0 * each.both:.1f} %"
             first, dip, second = each.humps
             words["ground"] = f"{first:.2f} weights, {dip:.2f}, {second:.2f} in a stance; at most {each.peak:.2f}"
@@ -116,7 +120,8 @@ def strides_of(times: Array, way: Array, loads: Array) -> Strides | None:
     count = sum(len(begins) - 1 for begins in spans)
     time, length = (sum(row[begins[-1]] - row[begins[0]] for begins in spans) / count for row in (times, way))
     both, peak = float(touches[start:end].all(axis=1).mean()), float(loads[start:end].max())
-    return Strides(count, float(time), float(length), tuple(stance), both, tuple(np.mean(humps, axis=0).tolist()), peak)
+    found = tuple(np.mean(humps, axis=0).tolist())
+    return Strides(count, float(time), float(length), tuple(stance), both, found, peak, count + 2 * len(spans))
 
 
 def _steady(on: Any, times: Array) -> None:

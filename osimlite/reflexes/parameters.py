@@ -44,11 +44,13 @@ class Parameters:
 
     Attributes:
         found: all that were asked for.
+        told: all numbers that were asked for, of the first candidate.
         auto: standard deviation that is not told, as part of the mean.
     """
 
     def __init__(self, values: Mapping[str, Array | float], count: int = 1) -> None:
         self.values, self.count, self.found, self.auto = values, count, dict[str, Parameter](), AUTO
+        self.told: dict[str, float] = {}
 
     def of(self, node: Node, key: str, otherwise: float, name: str = "") -> Array:
         """A number of each candidate (w,): what is written, or the parameter that is.
@@ -63,17 +65,16 @@ class Parameters:
             DocumentError: it is neither a number nor a parameter.
         """
         part = node.get(key)
-        if part is None:
-            return np.full(self.count, otherwise)
-        # ``1~0.5<0,2>``, ``~1<0,2>``, or a block of mean, std, min and max.
-        if part.parts:
-            mean, std = part.number("mean"), part.number("std", np.nan)
-            low, high = part.number("min", -np.inf), part.number("max", np.inf)
-            return self._asked(part, name or key, mean, std, low, high)
-        return self.read(part, name or key)
+        found = np.full(self.count, otherwise) if part is None else self.read(part, name or key)
+        self.told[name or key] = float(found[0])
+        return found
 
     def read(self, part: Node, name: str) -> Array:
         """As `of`, from the node itself."""
+        # ``1~0.5<0,2>``, ``~1<0,2>``, or a block of mean, std, min and max.
+        if part.parts:
+            wanted = ("mean", None), ("std", np.nan), ("min", -np.inf), ("max", np.inf)
+            return self._asked(part, name, *(part.number(key, value) for key, value in wanted))
         text = part.value
         match = _FORM.match(text)
         if match is None or not text:

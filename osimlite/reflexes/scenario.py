@@ -38,6 +38,8 @@ HIGH, CLOSE, TRIES = 10.0, 0.1, 100
 """How far a walker is lifted or lowered at most to carry its weight (m), how well it has to carry it, and tries."""
 LIFT = 0.1
 """M, by which it is lifted at a time."""
+SHORTEST = 1e-4
+"""S, of a control step: each is recorded."""
 AT_ONCE = 100
 """Control steps of a call; between them Ctrl-C is heard."""
 
@@ -109,7 +111,9 @@ class Scenario:
             model = read(found_file(settings.text("model_file"), self.folder))
         settings.get("model_file")
         self.model = model
-        self.step = settings.number("fixed_control_step_size", 0.005)
+        self.step = control_step(settings)
+        if self.duration < self.step:
+            raise objective.error(f"a walk of {self.duration:g} s is shorter than a control step of {self.step:g} s")
         self.begun = begun(self.optimizer, self.folder)
         if found is not None:
             self.population = int(self.optimizer.number("lambda", POPULATION))
@@ -308,6 +312,14 @@ def begun(optimizer: Node, folder: Path) -> dict[str, tuple[float, float, float]
         result |= {name: (v[0], v[0] if best else v[1], factor * v[2]) for name, v in own.items()}
         init.expect_all_asked("an init")
     return result
+
+
+def control_step(node: Node) -> float:
+    """For which controls are held, s."""
+    step = node.number("fixed_control_step_size", 0.005)
+    if not SHORTEST <= step < np.inf:
+        raise node.error(f"'fixed_control_step_size' is {SHORTEST:g} s or more, not {step:g} s")
+    return step
 
 
 def legs_of(node: Node) -> dict[str, str]:

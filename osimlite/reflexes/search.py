@@ -85,15 +85,16 @@ def search(
         raise SettingError(f"'{path}' is there already: go on with it (--resume), or take another folder")
     best, least = np.array([each.mean for each in own]), np.inf
     if resume:
-        known = read_par(path)
+        known, names = read_par(path), [each.name for each in own]
+        for name in sorted({*known} ^ {*names}):
+            whose = "the scenario" if name in known else f"'{path}'"
+            raise SettingError(f"{whose} has no parameter '{name}': they are of different searches")
         # As it was written there, a mean can be beyond the bounds of now.
         own = [
             each._replace(mean=float(np.clip(known[each.name][1], each.low, each.high)), std=known[each.name][2])
-            if each.name in known
-            else each
             for each in own
         ]
-        best = np.array([known[each.name][0] if each.name in known else each.mean for each in own])
+        best = np.array([known[name][0] for name in names])
         least = float(scenario.walk({each.name: value for each, value in zip(own, best, strict=True)}).results[0])
     make_folder(Path(folder))
     scale = np.array([each.std if each.std > 0.0 else 1e-6 for each in own])

@@ -7,9 +7,11 @@ the table and the state at a control step goes on to the last bit as if it had n
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from math import floor, inf
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
+from zlib import crc32
 
 import numpy as np
 
@@ -77,6 +79,13 @@ class Held:
     known: Floats  # its numbers
     plan: Ints  # see :mod:`osimlite.kernels.reflexes`
     numbers: Floats  # its numbers
+    gains: Mapping[str, float]  # what these are made of, by the names that it has for them
+
+    @property
+    def header(self) -> dict[str, str]:
+        """By what the table tells that it is of this very controller: gains, and a sum over all else that counts."""
+        others = crc32(self.plan.tobytes() + self.numbers.tobytes())
+        return {"gains": json.dumps({**self.gains, "fixed_control_step_size": self.step}), "reflexes": str(others)}
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -116,6 +125,15 @@ class Held:
             )
         if before.columns != self.columns:
             raise SettingError("the run that this one goes on from had a controller with other sensors or actuators")
+        theirs, ours = (json.loads(header.get("gains", "{}")) for header in (before.header, self.header))
+        for name in {**theirs, **ours}:
+            if theirs.get(name) != ours.get(name):
+                one, other = (f"{each[name]:g}" if name in each else "none" for each in (theirs, ours))
+                raise SettingError(
+                    f"the run that this one goes on from had '{name}' {one}, and this has {other}; go on with the same"
+                )
+        if before.header.get("reflexes") != self.header["reflexes"]:
+            raise SettingError("the run that this one goes on from had other reflexes, states of legs or noise")
         if not 0.0 <= end - before.times[-1] < self.step * (1.0 + NEAR):
             raise SettingError(
                 f"what is known of the controller ends at {before.times[-1]:g} s, the states at {end:g} s"
@@ -198,7 +216,7 @@ class HeldRuns:
             times = np.concatenate([self._before.times[-kept:], times])
             rows = np.concatenate([self._before.rows[-kept:], rows])
         count = int(np.searchsorted(times, end + NEAR * self.held.step, side="right"))
-        return StoTable("controller", times[:count], self.held.columns, rows[:count])
+        return StoTable("controller", times[:count], self.held.columns, rows[:count], header=self.held.header)
 
     def added_to(self, controls: Controls) -> Controls:
         """Controls with what the controller has added in a single run, as functions of time."""

@@ -220,7 +220,7 @@ class Trajectory(Tabular):
 
 def text_of(table: StoTable) -> str:
     """The text of a table's file."""
-    return sto_text(table.name, table.times.tolist(), table.columns, table.rows.tolist())
+    return sto_text(table.name, table.times.tolist(), table.columns, table.rows.tolist(), header=table.header)
 
 
 class Interrupted(KeyboardInterrupt):

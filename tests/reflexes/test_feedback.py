@@ -26,6 +26,11 @@ REFLEXES = {
     ],
     "MuscleReflex": {"target": "extensor", "source": "flexor", "KF": 0.2, "KV": 0.01, "delay": 0.005},
 }
+SOUGHT: dict[str, Any] = {
+    "dual_sided": 0,
+    "DofReflex": {"target": "motor", "source": "elbow", "P0": 1.2, "KP": "~1<0,9>", "KV": "~0.2<0,1>",
+                  "delay": "~0.005<0,0.05>"},
+}  # fmt: skip
 STEP = 0.005
 simulate: Any = osimlite.simulate
 """With a controller its trajectory has a table of that."""
@@ -201,12 +206,33 @@ def test_what_has_no_meaning_is_refused(model, tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"KP": 3.0}, r"'motor-elbow\.KP' 1, and this has 3"),
+        ({"P0": 1.0}, r"'motor-elbow\.P0' 1\.2, and this has 1"),
+        ({"delay": "0.006"}, r"'motor-elbow\.delay' 0\.005, and this has 0\.006"),
+        ({"allow_neg_P": 0}, "other reflexes, states of legs or noise"),
+    ],
+)
+@pytest.mark.parametrize("is_file", [True, False])
+def test_a_run_goes_on_by_the_gains_that_it_began_with(model, changed, words, is_file, tmp_path) -> None:
+    first = simulate(model, 0.1, controller=osimlite.Feedback({"ReflexController": SOUGHT}))
+    first.write(tmp_path)
+    before = tmp_path if is_file else first
+    other = {**SOUGHT, "DofReflex": {**SOUGHT["DofReflex"], **changed}}
+    with pytest.raises(OsimliteError, match=words):
+        simulate(model, 0.2, controller=osimlite.Feedback({"ReflexController": other}), resume=before)
+
+
+@pytest.mark.parametrize(
     ("given", "words"),
     [
         ({"DofReflex": {}}, "a controller is needed"),
         ({"ReflexController": [REFLEXES] * 2}, "'ReflexController' stands beside 'ReflexController'; join them"),
         ({"ReflexController": REFLEXES, "CompositeController": {}}, "'CompositeController' stands beside 'Reflex"),
-        ({"ReflexController": REFLEXES, "fixed_control_step_size": 0}, "control step of 0 s"),
+        ({"ReflexController": REFLEXES, "fixed_control_step_size": 0}, "'fixed_control_step_size' is 0.0001 s or"),
+        ({"ReflexController": REFLEXES, "fixed_control_step_size": 1e-9}, "0.0001 s or more, not 1e-09 s"),
+        ({"ReflexController": {"DofReflex": {"target": "motor", "source": "elbow", "delay": 11}}}, "more than 10 s"),
         ({"ReflexController": REFLEXES, "measure": 1}, "'measure' of a file of a controller is not done here"),
         ({"CompositeController": {"NoiseControler": {}}}, "'NoiseControler'.*did you mean 'NoiseController'"),
         ({"CompositeController": {"NoiseController": [{}, {}]}}, "a NoiseController already"),
@@ -366,20 +392,13 @@ def test_kernels_as_python_go_likewise(model, monkeypatch) -> None:
     assert plain.controller.rows == pytest.approx(expected.controller.rows, rel=1e-9, abs=1e-12)
 
 
-SOUGHT = {
-    "dual_sided": 0,
-    "DofReflex": {"target": "motor", "source": "elbow", "P0": 1.2, "KP": "~1<0,9>", "KV": "~0.2<0,1>",
-                  "delay": "~0.005<0,0.05>"},
-}  # fmt: skip
-
-
 def test_gains_of_many_runs_are_those_of_single_ones_bit_for_bit(model) -> None:
     """Also with delays that differ, and beside other numbers of the model."""
     from osimlite.sweep.plan import plan
     from osimlite.sweep.runner import Runner
 
     feedback = osimlite.Feedback({"ReflexController": SOUGHT})
-    choices = {"to": 0.3, "measures": ("elbow/value",), "controller": feedback}
+    choices: Any = {"to": 0.3, "measures": ("elbow/value",), "controller": feedback}
     made = plan(model, {}, **choices)
     assert {item.name: (item.low, item.high) for item in made.variables} == {
         "motor-elbow.delay": (0.0, 0.05), "motor-elbow.KP": (0.0, 9.0), "motor-elbow.KV": (0.0, 1.0),

@@ -25,7 +25,7 @@ def loads_of(phase) -> Any:
 def test_strides_are_counted() -> None:
     loads = np.column_stack([loads_of(10), loads_of(60)])
     found = strides_of(TIMES, 1.5 * TIMES, loads)
-    assert found is not None and found.number == 16
+    assert found is not None and (found.number, found.touches) == (16, 20)
     assert (found.time, found.length, found.peak) == pytest.approx((1.0, 1.5, 1.2), abs=1e-12)
     assert found.stance == pytest.approx((0.6, 0.6), abs=1e-12) and found.both == pytest.approx(0.2, abs=0.01)
     assert found.humps == pytest.approx((1.2, 0.6, 1.0), abs=1e-12)
@@ -38,7 +38,7 @@ def test_scuffs_and_bounces_are_no_steps() -> None:
     loads[90:93, 0], loads[530:532, 0] = 0.3, 0.0
     found = strides_of(TIMES, TIMES, loads)
     assert found is not None and expected is not None
-    assert found[:5] == expected[:5]
+    assert found[:5] == expected[:5] and found.touches == expected.touches
 
 
 def test_a_stance_may_be_one_moment() -> None:

@@ -122,6 +122,11 @@ def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
     assert {name: best for name, (best, _, _) in read_par(tmp_path / "out" / "best.par").items()} == found
     with pytest.raises(OsimliteError, match=r"best\.par' is there already: go on with it"):
         search(Scenario(arm), tmp_path / "out", generations=1, population=8)
+    text = (tmp_path / "out" / "best.par").read_text()
+    (tmp_path / "out" / "best.par").write_text(text.replace("elbow.KP", "elbow.KQ"))
+    with pytest.raises(OsimliteError, match=r"has no parameter 'flexor-elbow\.K[PQ]': they are of different searches"):
+        search(Scenario(arm), tmp_path / "out", generations=1, population=8, resume=True)
+    (tmp_path / "out" / "best.par").write_text(text)
     # The best so far is one of the candidates, and a mean beyond the bounds is none.
     text = (tmp_path / "out" / "best.par").read_text().split("\n", 1)
     name, best, _, std = text[0].split()
@@ -187,6 +192,8 @@ def test_yaml_and_data_of_python_say_the_same_as_a_scenario(arm, tmp_path) -> No
         ("delay = 0.01", "delay = -0.01", "a delay of -0.01 s"),
         ("min = 65 max = 72", "min = 72 max = 65", "from 72 to 65 there is no value"),
         ("max_duration = 1", "max_duration = 0", "max_duration is to be positive"),
+        ("max_duration = 1", "max_duration = 0.001", "0.001 s is shorter than a control step of 0.005 s"),
+        ("initial_load = 0", "fixed_control_step_size = 1e-9", "is 0.0001 s or more, not 1e-09 s"),
         ("~2<0,20>", "~30<0,20>", "'flexor-elbow.KP' begins at 30, which is not from 0 to 20"),
         ("~2<0,20>", "~2<20,0>", "begins at 2, which is not from 20 to 0"),
         ("source = elbow P0 = 1.2 KP = ~2", "P0 = 1.2 KP = ~2", "'source' is missing"),

@@ -8,6 +8,7 @@ from array import array
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -67,10 +68,12 @@ def sto_text(
     rows: Iterable[Iterable[float]],
     *,
     in_degrees: bool = False,
+    header: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
-    """Write a table as OpenSim 4.6 does, but with all digits of every number."""
+    """Write a table as OpenSim 4.6 does, but with all digits of every number, and more in its header."""
     lines = list(_lines(times, rows, 1))
-    return "".join([*_header(name, columns, len(lines), in_degrees, "double"), *lines])
+    first, *others = _header(name, columns, len(lines), in_degrees, "double")
+    return "".join([first, *(f"{key}={value}\n" for key, value in header.items()), *others, *lines])
 
 
 def write_sto(
