@@ -128,6 +128,13 @@ class Setup(Subject):
         """The table in a file that is named here; None if there is none, or it cannot be read."""
         return table_at(self.place(name.strip())) if is_given(name) and is_table(name) else None
 
+    def with_tables(self, items: Iterable[Any], tag: str) -> Iterator[tuple[Any, Table]]:
+        """Objects, each with the table that a property of it names; none without one, or with one without labels."""
+        for item in items:
+            table = self.table(getattr(item, tag))
+            if table is not None and table.labels:
+                yield item, table
+
     def document(self, name: str) -> Object | None:
         """The top of a document that is named here; None if there is none, or it cannot be read."""
         return top_at(self.place(name.strip())) if is_given(name) else None

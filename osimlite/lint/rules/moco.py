@@ -156,10 +156,8 @@ def study_data(setup: Setup, found: FindingSink) -> None:
                 )  # fmt: skip
     if setup.tree is None or any(setup.named("ModelOperator")):
         return
-    for item in setup.having("guess_file"):
-        guess = setup.table(item.guess_file)
-        fault = _fault_of_guess(setup, setup.tree, guess) if guess is not None and guess.labels else ""
-        if fault:
+    for item, guess in setup.with_tables(setup.having("guess_file"), "guess_file"):
+        if fault := _fault_of_guess(setup, setup.tree, guess):
             found(f"the guess '{item.guess_file}' {fault}: OpenSim refuses it", item, tag="guess_file")
 
 

@@ -42,9 +42,8 @@ def scale_factor(setup: Setup, found: FindingSink) -> None:
         for factor in dict.fromkeys(scale.scales) if scale.apply else ():
             if not _LEAST <= factor <= _MOST:
                 found(f"{called(scale)} scales {scale.segment} by {factor:g}", scale, tag="scales")
-    for scaler in setup.named("ModelScaler"):
-        table = setup.table(scaler.marker_file)
-        if table is None or setup.tree is None or not scaler.apply or "measurements" not in scaler.scaling_order:
+    for scaler, table in setup.with_tables(setup.named("ModelScaler"), "marker_file"):
+        if setup.tree is None or not scaler.apply or "measurements" not in scaler.scaling_order:
             continue
         said = table.entries.get("Units")
         places, unit = marker_places(setup), METRES.get(said.value.text, math.nan) if said else math.nan

@@ -46,10 +46,7 @@ def load_columns(setup: Setup, found: FindingSink) -> None:
       </ExternalLoads>
     ```
     """
-    for loads in setup.named("ExternalLoads"):
-        table = setup.table(loads.datafile)
-        if table is None or not table.labels:
-            continue
+    for loads, table in setup.with_tables(setup.named("ExternalLoads"), "datafile"):
         columns = table.columns
         prefixes = sorted({column[:-1] for column in columns if column[-1:] in "xyzXYZ"})
         forces = members(loads, "ExternalForce")

@@ -17,10 +17,7 @@ from osimlite.text import counted
 
 def marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
     """Every part of a tool that fits markers, with its data."""
-    for item in setup.having("ik_task_set", "marker_file"):
-        table = setup.table(item.marker_file)
-        if table is not None and table.labels:
-            yield item, table
+    return setup.with_tables(setup.having("ik_task_set", "marker_file"), "marker_file")
 
 
 @rule("OSIM841", "marker-not-measured", severity=WARNING, about="document")
@@ -80,10 +77,7 @@ def marker_not_measured(setup: Setup, found: FindingSink) -> None:
                     f"'{user.marker_file}' has no marker '{task.name}': OpenSim leaves the task out",
                     task, attribute="name", suggestion=nearest_name(task.name, labels),
                 )  # fmt: skip
-    for scaler in setup.named("ModelScaler"):
-        static = setup.table(scaler.marker_file)
-        if static is None or not static.labels:
-            continue
+    for scaler, static in setup.with_tables(setup.named("ModelScaler"), "marker_file"):
         gone = _unseen(static, scaler.time_range)
         for measurement in members(scaler.measurement_set, "Measurement") if scaler.apply else ():
             for pair in members(measurement.marker_pair_set, "MarkerPair") if measurement.apply else ():

@@ -146,10 +146,8 @@ def _look_up_controls(setup: Setup, tool: Object, plain: set[str], found: Findin
             found(f"{called(control)} has no nodes: OpenSim fails", control, tag="x_nodes")
         elif follows and not control.is_model_control:
             found(f"{called(control)} bounds no control of the model: OpenSim fails", control, tag="is_model_control")
-    for controller in setup.named("ControlSetController"):
-        table = setup.table(controller.controls_file)
-        lost = [column for column in table.columns if column not in actuators] if table is not None else []
-        if lost:
+    for controller, table in setup.with_tables(setup.named("ControlSetController"), "controls_file"):
+        if lost := [column for column in table.columns if column not in actuators]:
             found(
                 f"the model has no actuator for the columns {listed(map(repr, lost))} of "
                 f"'{controller.controls_file}': OpenSim refuses it",

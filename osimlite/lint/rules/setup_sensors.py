@@ -18,10 +18,8 @@ def _orientations(setup: Setup) -> Iterator[tuple[Any, str, str, Table]]:
         ("IMUInverseKinematicsTool", "orientations_file", ""),
         ("IMUPlacer", "orientation_file_for_calibration", "_imu"),
     ):
-        for item in setup.named(kind):
-            table = setup.table(getattr(item, tag))
-            if table is not None and table.labels:
-                yield item, tag, ending, table
+        for item, table in setup.with_tables(setup.named(kind), tag):
+            yield item, tag, ending, table
 
 
 @rule("OSIM848", "sensor-without-frame", severity=WARNING, about="document")

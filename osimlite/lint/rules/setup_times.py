@@ -295,9 +295,8 @@ def motion_in_degrees(setup: Setup, found: FindingSink) -> None:
                 "takes it for radians",
                 item, tag=tag, severity=ERROR,
             )  # fmt: skip
-    for user in setup.having("ik_task_set", "coordinate_file"):
-        values = setup.table(user.coordinate_file)
-        if values is None or isinstance(values.header, MarkerHeader) or values.header.in_degrees:
+    for user, values in setup.with_tables(setup.having("ik_task_set", "coordinate_file"), "coordinate_file"):
+        if isinstance(values.header, MarkerHeader) or values.header.in_degrees:
             continue
         tasks = members(user.ik_task_set, "IKCoordinateTask")
         read = {task.name for task in tasks if task.apply and task.value_type == "from_file"} & angles_of(setup)
