@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from osimlite.cli._console import complain, hand_over, print_diff, say, show, wants_colour
+from osimlite.cli._options import named_folders
 from osimlite.cli._progress import progress_bar
 from osimlite.errors import MissingFileError, OsimliteError
 from osimlite.files import read_standard_input, unsaved
@@ -36,22 +37,23 @@ def run(
     diff: bool = False,
     baseline: str | None = None,
     write_baseline: str | None = None,
-    geometry: Sequence[Path] = (),
-    classes: Sequence[str] = (),
+    geometry: Sequence[Path] | None = None,
+    classes: Sequence[str] | None = None,
     target_version: str = "",
     statistics: bool = False,
-    cached: bool = True,
+    no_cache: bool = False,
     everything: bool = False,
     stdin_filename: str | None = None,
     only_ours: bool = False,
 ) -> int:
     """Check files and folders, write the report to standard output, and return the exit code."""
+    folders = named_folders(geometry)
     expect_known(format, fail_on)
     given = Config(
         checked_words(select),
         checked_words(ignore),
-        mesh_paths=tuple(str(path.resolve()) for path in geometry),
-        classes=tuple(map(os.path.abspath, classes)),
+        mesh_paths=tuple(str(path.resolve()) for path in folders),
+        classes=tuple(map(os.path.abspath, classes or ())),
         target_version=target_version,
     )
     if "-" in paths and (fix or unsafe_fixes) and not diff:
@@ -73,7 +75,7 @@ def run(
         say(f"Mended {counted(count, 'place')}{_more(left)}.", err=True)
     with progress_bar("checking", len(files)) as progress:
         # Somebody who looks on is told what is not measured yet.
-        report = check_files(files, given, cached=cached, waits=not sys.stderr.isatty(), progress=progress)
+        report = check_files(files, given, cached=not no_cache, waits=not sys.stderr.isatty(), progress=progress)
     report.passed = passed
     if write_baseline is not None:
         from osimlite.lint.baseline import write_baseline as write

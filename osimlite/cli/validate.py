@@ -65,27 +65,8 @@ def validate(
 
     Example: osimlite validate walker.osim --format concise
     """
+    # All of it goes on under the same names.
+    given = locals()
     from osimlite.cli._validating import run
 
-    raise SystemExit(
-        run(
-            paths,
-            format=format,
-            select=select,
-            ignore=ignore,
-            fail_on=fail_on,
-            fix=fix,
-            unsafe_fixes=unsafe_fixes,
-            diff=diff,
-            baseline=baseline,
-            write_baseline=write_baseline,
-            geometry=options.named_folders(geometry),
-            classes=classes or (),
-            target_version=target_version,
-            statistics=statistics,
-            cached=not no_cache,
-            everything=everything,
-            stdin_filename=stdin_filename,
-            only_ours=only_ours,
-        )
-    )
+    raise SystemExit(run(**given))

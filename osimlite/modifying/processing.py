@@ -8,7 +8,7 @@ from pathlib import Path
 from osimlite.document.kept import read_anew
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.modifying.operators import OPERATIONS
-from osimlite.schema.model import Model, expect_model
+from osimlite.schema.model import Model
 from osimlite.schema.tools.processors import ModelOperator, ModelProcessor
 
 
@@ -44,11 +44,3 @@ def apply(model: Model, operators: Iterable[ModelOperator], folder: str | Path =
             known = ", ".join(cls.__name__ for cls in OPERATIONS)
             raise UnsupportedError(f"a {name} cannot be applied; there are {known}")
         operation(model, operator, Path(folder))
-
-
-def modified(model: Model, operators: Iterable[ModelOperator], folder: str | Path = ".") -> Model:
-    """A copy of a model, changed as operators say; see :func:`apply`."""
-    expect_model(model)
-    result = model.copy_deep()
-    apply(result, operators, folder)
-    return result

@@ -40,7 +40,7 @@ def project(fixtures, tmp_path, monkeypatch):
 def test_a_folder_is_checked_as_a_whole(project, capsys):
     (project / "leg_no_knee.mot").unlink()
     (project / "leg_degrees.mot").unlink()
-    assert validate_paths(["."], cached=False) == 0
+    assert validate_paths(["."], no_cache=True) == 0
     assert capsys.readouterr().out.startswith("Nothing found in 12")
     assert validate(".").checked == 12
     assert len(project_files([".", project / "ik.xml", "./../project"])) == 12
