@@ -56,6 +56,31 @@ def smooth_contact_force(
     return along(times(f, n), f * friction(w, us, ud, uv, vt) / w, slip)
 
 
+def smooth_contact_derivatives(
+    d: float, R: float, E: float, cf: float, bd: float, c: float, us: float, ud: float, uv: float, vt: float,
+    bv: float, n: Vector, v: Vector,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """How the force of `smooth_contact_force` changes; the arguments are its own and those of `smooth_hertz`.
+
+    Returns:
+        Of the force along n its derivatives by the depth (N/m) and by the approach v n (N s/m), the force across n over
+        the slip (N s/m), and by what part the force grows with the depth (1/m); all 0 where there is no force.
+    """
+    hertz, vn = smooth_hertz(d, R, E, cf, bd), dot(v, n)
+    if hertz <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    # 1 - tanh^2 over (1 + tanh) / 2 is 2 (1 - tanh).
+    growth = 1.5 * d / (d * d + cf) + bd * (1.0 - tanh(bd * d))
+    part, slope = 1.0 + 1.5 * c * vn, 1.5 * c
+    if c != 0.0:
+        t = tanh(bv * (vn + 2.0 / (3.0 * c)))
+        slope = (0.5 + 0.5 * t) * (slope + part * bv * (1.0 - t))
+        part *= 0.5 + 0.5 * t
+    slip = along(v, -vn, n)
+    w = sqrt(dot(slip, slip) + cf)
+    return hertz * part * growth, hertz * slope, hertz * part * friction(w, us, ud, uv, vt) / w, growth
+
+
 def smooth_contact_energy(hertz: float, d: float) -> float:
     """(2/5) fh d, in J, as Simbody approximates the energy; negative (and tiny) where the surfaces are apart.
 

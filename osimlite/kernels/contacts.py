@@ -9,6 +9,7 @@ from __future__ import annotations
 from math import sqrt
 
 from osimlite.forces.hunt_crossley import contact_derivatives, contact_force, half_space_sphere, sphere_sphere
+from osimlite.forces.smooth_contact import smooth_contact_derivatives
 from osimlite.forces.vectors import ZERO, Vector, along, cross, dot, minus, over, plus, put, times, vector
 from osimlite.kernels.condensation import CENTER, INVERSE
 from osimlite.kernels.layout import ITEM, LINK, LINK_WORK, MODEL, MOTION, OPERATION, OPERATION_WORK, OUTCOME, WORK
@@ -18,6 +19,8 @@ from osimlite.kernels.points import apply_force, direction, station, velocity
 
 RADIUS = 10
 """Place of the radius of surface 2 among them."""
+SMOOTH = 9
+"""How many numbers the law of smooth contact has."""
 
 
 def touch_half_space(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -67,26 +70,82 @@ def contact_response(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: 
     if d > 0.0:
         one, two, p = s[pair + ITEM.OWN], s[pair + ITEM.OWN + 1], at(x, s[pair + ITEM.NUMBERS])
         v = minus(velocity(s, w, one, point), velocity(s, w, two, point))
-        pressed, damped, dragged = contact_derivatives(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
-        way, by_depth = n, 0.0
-        if axis > 0:
-            # Any two directions across the normal do.
-            nx, ny, nz = n
-            way = over(cross(n, (1.0, 0.0, 0.0)), sqrt(ny * ny + nz * nz))
-            if abs(nx) > 0.7:
-                way = over(cross(n, (0.0, 1.0, 0.0)), sqrt(nx * nx + nz * nz))
-            if axis > 1:
-                way = cross(n, way)
-            change[1], by_depth = -dragged, -1.5 / d * dragged * dot(v, way)
-        else:
-            change[0], change[1] = -pressed, -damped
-        apply_force(s, w, two, point, way)
-        apply_force(s, w, one, point, times(-1.0, way))
+        changes = contact_derivatives(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
         center = station(s, w, two, vector(p, CENTER))
-        sinks = times(1.0 - p[12], n)
-        turns(s, w, y, f, two, point, center, n, sinks, times(by_depth, n), times(change[1], way))
-        turns(s, w, y, f, one, point, point, n, sinks, times(-by_depth, n), times(-change[1], way))
+        respond(s, w, y, f, one, two, axis, point, center, n, v, 1.0 - p[12], changes, 1.5 / d)
     return OUTCOME.OK
+
+
+def smooth_contact_response(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+    """The same of a smooth contact of a sphere with a half space.
+
+    The integers of the item are how far behind it that of the contact is, and the direction. The numbers of that are
+    those of the law, and of the sphere on the plane (:mod:`osimlite.simulation.elements.geometries.sphere_on_plane`).
+    """
+    i, change = at(s, item), at(w, WORK.SCRATCH)
+    for k in range(INVERSE):
+        change[k] = 0.0
+    contact = item + i[ITEM.OWN]
+    p, g = at(x, s[contact + ITEM.NUMBERS]), at(s, contact + ITEM.OWN)
+    place = at(p, SMOOTH)
+    n, center = direction(s, w, g[0], vector(place, 3)), station(s, w, g[1], vector(place, 6))
+    d = place[9] - dot(minus(center, station(s, w, g[0], vector(place, 0))), n)
+    point = along(center, 0.5 * d - place[9], n)
+    v = minus(velocity(s, w, g[0], point), velocity(s, w, g[1], point))
+    pressed, damped, dragged, growth = smooth_contact_derivatives(
+        d, place[9], p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], n, v
+    )
+    if growth != 0.0:
+        changes = pressed, damped, dragged
+        respond(s, w, y, f, g[0], g[1], i[ITEM.OWN + 1], point, center, n, v, 0.5, changes, growth)
+    return OUTCOME.OK
+
+
+def respond(
+    s: Ints,
+    w: Floats,
+    y: Floats,
+    f: Floats,
+    one: int,
+    two: int,
+    axis: int,
+    point: Vector,
+    center: Vector,
+    n: Vector,
+    v: Vector,
+    sinks: float,
+    changes: Vector,
+    growth: float,
+) -> None:
+    """Push two links apart, and leave in SCRATCH how the force of their contact changes.
+
+    Args:
+        one, two: the links.
+        axis: 0 along the normal, 1 and 2 across it.
+        point: where they touch.
+        center: of the second, with which the point moves but for a part `sinks` of what that moves along the normal.
+        n: the normal, from one to two.
+        v: velocity of one relative to two.
+        changes: derivatives along the normal by depth and approach, and force across it over the slip.
+        growth: by what part the force grows with the depth.
+    """
+    change, (pressed, damped, dragged) = at(w, WORK.SCRATCH), changes
+    way, by_depth = n, 0.0
+    if axis > 0:
+        # Any two directions across the normal do.
+        nx, ny, nz = n
+        way = over(cross(n, (1.0, 0.0, 0.0)), sqrt(ny * ny + nz * nz))
+        if abs(nx) > 0.7:
+            way = over(cross(n, (0.0, 1.0, 0.0)), sqrt(nx * nx + nz * nz))
+        if axis > 1:
+            way = cross(n, way)
+        change[1], by_depth = -dragged, -growth * dragged * dot(v, way)
+    else:
+        change[0], change[1] = -pressed, -damped
+    apply_force(s, w, two, point, way)
+    apply_force(s, w, one, point, times(-1.0, way))
+    turns(s, w, y, f, two, point, center, n, times(sinks, n), times(by_depth, n), times(change[1], way))
+    turns(s, w, y, f, one, point, point, n, times(sinks, n), times(-by_depth, n), times(-change[1], way))
 
 
 def turns(

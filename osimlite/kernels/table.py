@@ -43,6 +43,7 @@ LAW_MODULES = {
     "touch_half_space": "contacts",
     "touch_spheres": "contacts",
     "contact_response": "contacts",
+    "smooth_contact_response": "contacts",
     "touch_ellipsoid": "rare_contacts",
     "touch_ellipsoids": "rare_contacts",
     "early_return": "rare_contacts",

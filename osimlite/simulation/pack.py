@@ -119,7 +119,8 @@ class Packer(LinkPacker):
                     if not runs or runs[-1][0] != item.abreast:
                         runs.append((item.abreast, len(records)))
                     records.append(len(self.ints))
-                self.kernels[len(self.ints)] = item.kernel if item.python is None else item.python
+                if item.kernel or item.python is not None:
+                    self.kernels[len(self.ints)] = item.kernel if item.python is None else item.python
                 self.owners[len(self.ints)] = owner
                 if item.equilibrium:
                     settling[len(self.ints)] = item.equilibrium

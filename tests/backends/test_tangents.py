@@ -175,7 +175,10 @@ NO_RATES = {
     **dict.fromkeys(("fit_frames", "least_effort", "watch", "look", "push_each"), "searches and looks at many poses"),
     **dict.fromkeys(("equilibrate", "project"), "what finds a start, which is held"),
     **{name: "curves of paths, for pictures" for name in LAW_MODULES if name.startswith("trace_")},
-    **dict.fromkeys(("contact_response", "contact_places"), "what methods for stiff motions ask, and pictures"),
+    **dict.fromkeys(
+        ("contact_response", "smooth_contact_response", "contact_places"),
+        "what methods for stiff motions ask, and pictures",
+    ),
 }
 """Kernels that nobody needs derivatives from, and why."""
 OF_RATES = [name for name in LAW_MODULES if name not in NO_RATES]

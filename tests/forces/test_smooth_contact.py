@@ -1,12 +1,19 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.forces.hunt_crossley import combine_materials, contact_energy, contact_force
-from osimlite.forces.smooth_contact import smooth_contact_energy, smooth_contact_force, smooth_hertz
+from osimlite.forces.smooth_contact import (
+    smooth_contact_derivatives,
+    smooth_contact_energy,
+    smooth_contact_force,
+    smooth_hertz,
+)
 
 UP = 0.0, 1.0, 0.0
 SHARP = 1e-18, 1e7
@@ -33,3 +40,28 @@ def test_apart_there_is_nearly_nothing():
     assert 0.0 < smooth_hertz(-0.01, 0.1, 1e5, 1e-5, 300.0) < smooth_hertz(0.0, 0.1, 1e5, 1e-5, 300.0)
     force = smooth_contact_force(100.0, 0.5, 0.8, 0.4, 0.1, 0.2, *SHARP, UP, (0.0, -5.0, 0.0))
     assert force == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+
+
+@given(
+    st.floats(-0.005, 0.02),
+    st.floats(-0.6, 0.3),
+    st.floats(1e-4, 0.5),
+    st.floats(0.0, 6.3),
+    st.sampled_from([0.0, 1.2]),
+)
+def test_derivatives_are_those_of_the_force(d, approach, slip, turn, c):
+    R, E, cf, bd, friction, bv, h = 0.05, 1e6, 1e-5, 300.0, (0.8, 0.4, 0.1, 0.1), 50.0, 1e-6
+
+    def force(deeper, faster):
+        v = slip * math.cos(turn), approach + faster, slip * math.sin(turn)
+        hertz = smooth_hertz(d + deeper, R, E, cf, bd)
+        return np.array(smooth_contact_force(hertz, c, *friction, cf, bv, UP, v))
+
+    v = slip * math.cos(turn), approach, slip * math.sin(turn)
+    by_depth, by_speed, across, growth = smooth_contact_derivatives(d, R, E, cf, bd, c, *friction, bv, UP, v)
+    there, scale = force(0.0, 0.0), abs(force(0.0, 0.0)[1]) + 1e-3
+    assert by_depth == pytest.approx((force(h, 0.0) - force(-h, 0.0))[1] / (2.0 * h), abs=1e-3 * scale)
+    assert by_speed == pytest.approx((force(0.0, h) - force(0.0, -h))[1] / (2.0 * h), abs=1e-5 * scale)
+    assert across * slip == pytest.approx(math.copysign(math.hypot(there[0], there[2]), across), rel=1e-9, abs=1e-12)
+    assert growth * there[1] == pytest.approx(by_depth, rel=1e-9, abs=1e-12)
+    assert smooth_contact_derivatives(-1.0, R, E, cf, bd, c, *friction, bv, UP, v) == (0.0, 0.0, 0.0, 0.0)

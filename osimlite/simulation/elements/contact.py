@@ -110,7 +110,7 @@ class PairContact:
             if not (one.radii or two.radii):
                 for axis in range(3):
                     ints = back, axis, int(one.is_half_space)
-                    result.append(Item(RESPONSE, ints, is_part=True, response=Response(RESPONSE, 0, 0, 1)))
+                    result.append(Item(ints=ints, is_part=True, response=Response(RESPONSE, 0, 0, 1)))
                     back += ITEM.OWN + len(ints)
             back -= ITEM.OWN + 2
         return result

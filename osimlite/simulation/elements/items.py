@@ -27,7 +27,8 @@ CONTROLS = ""
 class Item:
     """One item."""
 
-    kernel: str = ""  # name of what computes it, see `law_function`
+    # name of what computes it, see `law_function`; "" for one that only tells how another one changes
+    kernel: str = ""
     ints: tuple[int, ...] = ()  # of its own
     numbers: tuple[float, ...] = ()  # of its own
     room: int = 0  # length of its record, if it is not that of a contact

@@ -87,6 +87,8 @@ class Kind:
     # derivatives of the force and of each rate by displacement, its speed and each state that the law is given, row
     # by row, from what the law is given and what its other parameters name of the record; differences if None
     slopes: Callable[..., Any] | None = None
+    # name of the kernel that tells how the force of a contact changes along its normal and across it
+    contact_response: str = ""
     abreast: Abreast | None = None  # the law in parts, which several forces take together
     # what is said of a force whose law, or equilibrium, has no solution, from what is `known` of it
     told: Callable[[Mapping[str, float]], str] | None = None
@@ -195,7 +197,12 @@ class Kind:
             abreast=self.name + ABREAST if self.abreast is not None and not force.form else "",
             response=Response(self.name + RESPONSE, len(heads), len(self.states), sense) if responds else None,
         )
-        return [*parts, item]
+        responses = []
+        if self.contact_response and not force.form:
+            told = Response(self.contact_response, 0, 0, 1)
+            size = ITEM.OWN + 2
+            responses = [Item(ints=(size * (3 - axis), axis), is_part=True, response=told) for axis in range(3)]
+        return [*responses, *parts, item]
 
 
 @dataclass(frozen=True)

@@ -56,5 +56,6 @@ KIND = Kind(
         "transition_velocity",
         "hunt_crossley_smoothing",
     ),
+    contact_response="smooth_contact_response",
     check=_check,
 )
