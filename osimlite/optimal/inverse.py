@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +37,7 @@ def problem_of_inverse(
     file: Path | None = None,
     folder: Path | None = None,
     more: Callable[[MocoStudy], None] | None = None,
+    scaled: Mapping[str, str] | None = None,
 ) -> Problem:
     """The problem that the tool makes.
 
@@ -45,6 +46,7 @@ def problem_of_inverse(
         file: they stand in.
         folder: that their files are in, if they are in none.
         more: changes the study before it becomes a problem: goals, bounds, settings of the solver.
+        scaled: as of :func:`osimlite.moco.solve`.
 
     Raises:
         OsimliteError: the settings or their files are not as they have to be.
@@ -76,7 +78,7 @@ def problem_of_inverse(
     set_times(asked, tool, [table], study)
     if more is not None:
         more(study)
-    problem = Problem(study, file, folder, motion=motion)
+    problem = Problem(study, file, folder, motion=motion, scaled=scaled)
     if not tool.kinematics_allow_extra_columns:
         known = (*problem.functions.inserted(table.times[:1]), *problem.functions.states)
         for label in table.columns:
@@ -95,6 +97,7 @@ def inverse(
     more: Callable[[MocoStudy], None] | None = None,
     tell: Callable[[Progress], None] | None = None,
     refine: float | str | Refinement | None = None,
+    scaled: Mapping[str, str] | None = None,
 ) -> MocoSolution:
     """Find what muscles do in a motion that is given, as OpenSim's MocoInverse.
 
@@ -104,11 +107,12 @@ def inverse(
         more: changes the study before it is solved: goals, bounds, settings of the solver.
         tell: is told of each iteration.
         refine: as of :func:`osimlite.moco.solve`.
+        scaled: likewise.
 
     Raises:
         OsimliteError: as of :func:`problem_of_inverse`.
     """
-    problem = problem_of_inverse(tool, None, None if folder is None else Path(folder), more)
+    problem = problem_of_inverse(tool, None, None if folder is None else Path(folder), more, scaled)
     return solved_inverse(problem, tell, refine)
 
 

@@ -24,10 +24,12 @@ class Series:
     Attributes:
         number: among those of the problem.
         values: at times (n,) the value and both of its derivatives (3, n).
+        factor: place among the parameters of the problem of the one that it is multiplied by; None if by none.
     """
 
     number: int
     values: Callable[[Array], Array]
+    factor: int | None = None
 
 
 class Frame(NamedTuple):
@@ -51,7 +53,8 @@ class Point:
         multipliers: of the model's constraints.
         derivatives: that are variables: accelerations, and rates of auxiliary states; empty if explicit.
         slacks: of velocity corrections or projections, if the point has them.
-        p: parameters.
+        p: parameters, one for each number of the model that they stand for.
+        parameters: as the problem has them.
         known: what the series are made of: the time that they are expanded about, and three numbers for each.
         projections: values and speeds that the interval leads to, before they are moved onto the constraints, if the
             point has them.
@@ -65,6 +68,7 @@ class Point:
     derivatives: Formula
     slacks: Formula
     p: Formula
+    parameters: Formula
     known: Formula
     projections: Formula = field(default_factory=lambda: casadi.SX(0, 1))
     _kept: dict[str, Any] = field(default_factory=dict)
@@ -87,7 +91,8 @@ class Point:
     def at(self, series: Series) -> Formula:
         """What a series is at this time; exact to the second derivative, as the numbers are renewed for each time."""
         first, since = 1 + 3 * series.number, self.t - self.known[0]
-        return self.known[first] + since * (self.known[first + 1] + 0.5 * since * self.known[first + 2])
+        value = self.known[first] + since * (self.known[first + 1] + 0.5 * since * self.known[first + 2])
+        return value if series.factor is None else self.parameters[series.factor] * value
 
     @cached_property
     def rates(self) -> Formula:

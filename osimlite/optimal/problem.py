@@ -48,6 +48,7 @@ class Problem(Asked):
         folder: that those files are in, if the study is in none; the current folder if None.
         tables: by names of goals, in the place of those that their references name.
         motion: that is given exactly, as if the model had a PositionMotion.
+        scaled: by names of scale factors the columns of references that these multiply.
 
     Attributes:
         study: as given; `phase` and `solver` are its parts.
@@ -74,9 +75,11 @@ class Problem(Asked):
         folder: Path | None = None,
         tables: Mapping[str, StoTable] | None = None,
         motion: Motion | None = None,
+        scaled: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(file, folder)
-        self.tables = tables or {}
+        self.tables, self._scaled = tables or {}, scaled or {}
+        self._factors: dict[str, str] = {}
         self.study = study
         self.expect_sound(study)
         self.phase = study.problem.phases
@@ -98,6 +101,7 @@ class Problem(Asked):
             parameter.name: range_of(parameter.moco_bounds) or FREE for parameter in self.phase.parameters
         }
         self.parameter_owners = [place for place, own in enumerate(paths.values()) for _ in own]
+        self._add_factors()
         self._expect_infos()
         self.controls = control_bounds(self.phase, self.functions.controls, self.components)
         self.states = state_bounds(self.phase, self.functions.states, self.components, self.controls)
@@ -136,13 +140,15 @@ class Problem(Asked):
             found |= {name: weight.weight for name in names if matches(name)}
         return [*(found | own).values()]
 
-    def given(self, values: Callable[[Array], Array]) -> Series:
+    def given(self, values: Callable[[Array], Array], label: str = "") -> Series:
         """A function of time that is given, for formulas at points (``point.at(series)``).
 
         Args:
             values: at times (n,) the value and both of its derivatives by time (3, n).
+            label: of the column that it is, which a scale factor of the goal may multiply.
         """
-        series = Series(len(self.series), values)
+        factor = self._factors.get(label)
+        series = Series(len(self.series), values, None if factor is None else [*self.parameters].index(factor))
         self.series.append(series)
         return series
 
@@ -289,14 +295,28 @@ class Problem(Asked):
 
     def _terms(self, goal: MocoGoal) -> Terms:
         module = self._found(goal, "goals", "goals")
-        for factor in goal.scale_factors:
-            # Which column each is for is known to OpenSim's method alone that adds it.
-            message = "scale factors are not applied; no file says of what they are, and OpenSim applies none it reads"
-            raise self.refused(factor, message)
+        self._factors = {self._scaled[factor.name]: factor.name for factor in goal.scale_factors}
+        first = len(self.series)
         terms: Terms = module.terms(goal, self)
+        used = [item.factor for item in self.series[first:]]
+        for factor in goal.scale_factors:
+            if [*self.parameters].index(factor.name) not in used:
+                raise self.wrong(factor, f"the goal follows no column '{self._scaled[factor.name]}'")
+        self._factors = {}
         if goal.mode is not None and goal.mode not in terms.modes:
             raise self.wrong(goal, f"it cannot be of mode '{goal.mode}', as in Moco; it is a {terms.modes[0]}")
         return terms
+
+    def _add_factors(self) -> None:
+        """The scale factors of goals, which are parameters, too."""
+        for factor in [factor for goal in self.phase.goals for factor in goal.scale_factors]:
+            if factor.name not in self._scaled:
+                # OpenSim's method that adds it is told so, and its files are not.
+                message = "no file says which column it is for, and OpenSim applies none that it reads"
+                raise self.refused(factor, f"{message}; osimlite.moco is told by `scaled`")
+            if factor.name in self.parameters:
+                raise self.wrong(factor, "there is another parameter of its name")
+            self.parameters[factor.name] = range_of(factor) or FREE
 
     @property
     def binds(self) -> bool:

@@ -188,6 +188,7 @@ class Program:
             slacks=parts["slacks"],
             projections=parts["projections"],
             p=casadi.vertcat(*parameters) if parameters else SX(0, 1),
+            parameters=s[2:],
             known=known,
         )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +81,7 @@ def solve(
     folder: str | Path | None = None,
     tell: Callable[[Progress], None] | None = None,
     refine: float | str | Refinement | None = None,
+    scaled: Mapping[str, str] | None = None,
 ) -> MocoSolution:
     """Solve a study of Moco: the same nonlinear program as Moco's, with exact derivatives.
 
@@ -91,6 +92,8 @@ def solve(
         tell: is told of each iteration. Ctrl-C ends the search, and the best so far is what comes out.
         refine: split intervals of the mesh until the error of none is above this, see :class:`Refinement`; None for
             the mesh as it is.
+        scaled: by names of the goals' scale factors the column of the goal's table that each multiplies: what OpenSim's
+            ``addScaleFactor`` is told, and no file.
 
     Returns:
         What came out; `success` says whether it is a solution, and `violations` what is not fulfilled otherwise.
@@ -100,24 +103,27 @@ def solve(
         OsimliteError: the study cannot be read, or is none.
     """
     with in_file(study):
-        return solved(Program(problem_of(study, folder)), guess, tell, refine)
+        return solved(Program(problem_of(study, folder, scaled)), guess, tell, refine)
 
 
-def problem_of(study: str | Path | MocoStudy, folder: str | Path | None = None) -> Problem:
+def problem_of(
+    study: str | Path | MocoStudy, folder: str | Path | None = None, scaled: Mapping[str, str] | None = None
+) -> Problem:
     """The problem of a study.
 
     Args:
         study: a file, or the study itself.
         folder: that its files are in, if it is in none; the current folder if None.
+        scaled: as for :func:`solve`.
 
     Raises:
         OsimliteError: as for :func:`solve`.
     """
     if isinstance(study, MocoStudy):
-        return Problem(study, folder=None if folder is None else Path(folder))
+        return Problem(study, folder=None if folder is None else Path(folder), scaled=scaled)
     with in_file(study):
         top: Any = read_document(Source.of_file(Path(study)), of=MocoStudy).top
-        return Problem(top, Path(study))
+        return Problem(top, Path(study), scaled=scaled)
 
 
 def solved(

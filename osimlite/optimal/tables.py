@@ -127,7 +127,7 @@ def splines(problem: Problem, table: StoTable, columns: list[str]) -> list[Serie
         )
         raise DocumentError(message, file=table.file)
     curves = Curves(table.times, np.column_stack([table.times, *(table[name] for name in columns)])[:, 1:])
-    return [problem.given(partial(_column, curves, k)) for k in range(len(columns))]
+    return [problem.given(partial(_column, curves, k), name) for k, name in enumerate(columns)]
 
 
 def over_time(function: Function, times: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +34,7 @@ def problem_of_track(
     file: Path | None = None,
     folder: Path | None = None,
     more: Callable[[MocoStudy], None] | None = None,
+    scaled: Mapping[str, str] | None = None,
 ) -> tuple[Problem, MocoTrajectory | None]:
     """The problem that the tool makes, and what it starts from if that is not the middle between the bounds.
 
@@ -42,6 +43,7 @@ def problem_of_track(
         file: they stand in.
         folder: that their files are in, if they are in none.
         more: changes the study before it becomes a problem: goals, bounds, settings of the solver.
+        scaled: as of :func:`osimlite.moco.solve`.
 
     Raises:
         UnsupportedError: there is something that is not done here.
@@ -94,7 +96,7 @@ def problem_of_track(
     guess = None
     if tool.guess_file.strip():
         guess = MocoTrajectory.read(bare.place(tool.guess_file))
-    problem = Problem(study, file, place, tables)
+    problem = Problem(study, file, place, tables, scaled=scaled)
     if tool.apply_tracked_states_to_guess and "state_tracking" in tables:
         table = tables["state_tracking"]
         # Moco takes the rows one after the other from the first time to the last, whenever they were measured.
@@ -113,6 +115,7 @@ def track(
     more: Callable[[MocoStudy], None] | None = None,
     tell: Callable[[Progress], None] | None = None,
     refine: float | str | Refinement | None = None,
+    scaled: Mapping[str, str] | None = None,
 ) -> MocoSolution:
     """Find a motion that follows measured states, as OpenSim's MocoTrack.
 
@@ -122,11 +125,12 @@ def track(
         more: changes the study before it is solved: goals, bounds, settings of the solver.
         tell: is told of each iteration.
         refine: as of :func:`osimlite.moco.solve`.
+        scaled: likewise.
 
     Raises:
         OsimliteError: as of :func:`problem_of_track`.
     """
-    problem, guess = problem_of_track(tool, None, None if folder is None else Path(folder), more)
+    problem, guess = problem_of_track(tool, None, None if folder is None else Path(folder), more, scaled)
     return solved(Program(problem), guess, tell, refine)
 
 

@@ -288,9 +288,11 @@ def test_what_is_not_solved_is_refused_by_name_and_place(tmp_path):
     factor = '<scale_factors><MocoScaleFactor name="factor"/></scale_factors>\n'
     path.write_text(re.sub(r"(<MocoFinalTimeGoal .*?>\n)", rf"\1{factor}", text))
     line = next(k for k, words in enumerate(path.read_text().splitlines(), 1) if "<MocoScaleFactor" in words)
-    with pytest.raises(osimlite.OsimliteError, match="MocoScaleFactor 'factor': scale factors are not") as raised:
+    with pytest.raises(osimlite.OsimliteError, match="MocoScaleFactor 'factor': no file says which") as raised:
         solve(path)
     assert (raised.value.file, raised.value.line) == (str(path), line)
+    with pytest.raises(osimlite.OsimliteError, match="'factor': the goal follows no column '/tau0'"):
+        solve(path, scaled={"factor": "/tau0"})
     path.write_text(text.replace('name="/tau0"', 'name="/tau2"'))
     with pytest.raises(osimlite.OsimliteError, match="no control '/tau2'; did you mean '/tau"):
         solve(path)

@@ -44,14 +44,19 @@ OURS = """
 import json
 from osimlite import moco
 from osimlite.optimal.program import Program
-terms, missed = moco.evaluated(Program(moco.problem_of("study.omoco")), moco.MocoTrajectory.read("theirs.sto"))
-found = moco.solve("study.omoco")
-print(json.dumps([terms, missed[0].size, found.objective, found.success]))
+scaled = {"of_tau1": "/tau1", "of_tip": "tip_2"}
+program = Program(moco.problem_of("study.omoco", scaled=scaled))
+theirs = moco.MocoTrajectory.read("theirs.sto")
+# OpenSim loses those of markers and contacts as it copies its pointers to them.
+theirs.parameters["of_tip"] = 1.0
+terms, missed = moco.evaluated(program, theirs)
+found = moco.solve("study.omoco", scaled=scaled)
+print(json.dumps([terms, missed[0].size, found.objective, found.success, found.parameters]))
 """
 
 
 def test_markers_controls_and_bounds_over_time(tmp_path):
-    """Moco's solution has Moco's costs here, and ours costs no more."""
+    """Moco's solution has Moco's costs here, with factors by which columns count, and ours costs no more."""
     osim = pytest.importorskip("opensim")
     model = osim.ModelFactory.createDoublePendulum()
     model.addMarker(osim.Marker("tip", model.getBodySet().get(1), osim.Vec3(0.1, 0.05, 0.02)))
@@ -68,19 +73,22 @@ def test_markers_controls_and_bounds_over_time(tmp_path):
         "/jointset/j1/q1/speed": np.full(31, 0.3),
         "/tau0": 0.5 * t + 0.1,
         "/tau1": -0.2 * t,
+        "of_tau1": np.where(t == 0, 0.9, np.nan),
+        "of_tip": np.where(t == 0, 0.9, np.nan),
     }
     guess = tmp_path / "guess.sto"
     write_sto(guess, "", t, tuple(columns), np.column_stack([*columns.values()]))
     counts = (
-        "num_controls=2\nnum_derivatives=0\nnum_input_controls=0\nnum_multipliers=0\nnum_parameters=0\nnum_slacks=0\n"
+        "num_controls=2\nnum_derivatives=0\nnum_input_controls=0\nnum_multipliers=0\nnum_parameters=2\nnum_slacks=0\n"
     )
     text = guess.read_text().partition("endheader")[2]
     guess.write_text(f"inDegrees=no\n{counts}num_states=4\nDataType=double\nversion=3\nendheader{text}")
     said = [_said(tmp_path, command) for command in (["-m", "tests.oracle.moco_goals"], ["-c", OURS])]
-    theirs, (terms, missed, objective, success) = said
+    theirs, (terms, missed, objective, success, factors) = said
     assert terms == pytest.approx(theirs, rel=1e-10)
     assert missed < 1e-6 and success
     assert objective <= sum(theirs.values()) * (1.0 + 1e-6)
+    assert min(abs(factor - 1.0) for factor in factors.values()) > 0.01
 
 
 OUR_FRAMES = """
