@@ -61,6 +61,8 @@ def problem_of_inverse(
         implicit_auxiliary_derivatives_weight=AUXILIARY_WEIGHT,
         optim_convergence_tolerance=tool.convergence_tolerance,
         optim_constraint_tolerance=tool.constraint_tolerance,
+        # Moco has no such differences; without them a search ends up to 1e-3 above the least cost.
+        optim_hessian_approximation="exact",
         optim_sparsity_detection="random",
         optim_finite_difference_scheme="forward",
     )
