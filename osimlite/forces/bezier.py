@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from functools import lru_cache
 from math import hypot
 
+from osimlite.forces.carried import plain, settled
+
 Point = tuple[float, float, float]
 """x, y, and the slope there."""
 Numbers = tuple[float, ...]
@@ -129,6 +131,8 @@ def on_section(
 ) -> tuple[float, bool, float, float]:
     """u after some steps of Halley's search for the only root, whether more are wanted, and y and the slope there.
 
+    If numbers carry derivatives, the slope carries none.
+
     Args:
         c: where the coefficients of x and y are.
         p: place of the first of these.
@@ -137,18 +141,21 @@ def on_section(
         rest: how far x is from the start of the section.
         rounds: steps at most.
     """
-    goes_on = True
+    u, known, goes_on = plain(u), plain(rest), True
     for _ in range(rounds):
-        u, goes_on = nearer_place(c, p, apart, u, rest)
+        u, goes_on = nearer_place(c, p, apart, u, known)
         if not goes_on:
             break
+    off, run = missed(c, p, apart, u, rest)
     y, slope = value_at(c, p, apart, u)
-    return u, goes_on, y, slope
+    slope = plain(slope)
+    return settled(u, off, run), goes_on, settled(y, slope * off, 1.0), slope
 
 
 def nearer_place(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> tuple[float, bool]:
-    """u after a step, and whether more are wanted; the arguments are those of `on_section`."""
-    a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
+    """u after a step, and whether more are wanted; the arguments are those of `on_section`, without derivatives."""
+    a, b, d = plain(c[p]), plain(c[p + apart]), plain(c[p + 2 * apart])
+    e, f = plain(c[p + 3 * apart]), plain(c[p + 4 * apart])
     # In halves, which a processor computes side by side.
     v = u * u
     off = u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
@@ -171,11 +178,12 @@ def value_at(c: Sequence[float], p: int, apart: int, u: float) -> tuple[float, f
     return (g + u * h) + v * ((i + u * j) + v * (k + u * m)), rise / run
 
 
-def missed(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> float:
-    """How far u is from the root; the arguments are those of `on_section`."""
+def missed(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> tuple[float, float]:
+    """How far u is from the root, and the derivative of that; the arguments are those of `on_section`."""
     a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
     v = u * u
-    return u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
+    run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
+    return u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest, run
 
 
 def value_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tuple[float, float]:
@@ -187,22 +195,24 @@ def value_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> 
     if end > 0:
         return beyond_sum(c, of_y, of_x, total, end), total - total
     k, rest, u = first_place_of_sum(c, of_y, of_x, total)
-    # As numbers in a row, which on_section takes.
+    # As numbers of one kind in a row, which on_section takes.
+    zero = 0.0 * total
     own = (
         of_y * c[k + Y + 1] + of_x * c[k + X],
         of_y * c[k + Y + 2] + of_x * c[k + X + 1],
         of_y * c[k + Y + 3] + of_x * c[k + X + 2],
         of_y * c[k + Y + 4] + of_x * c[k + X + 3],
         of_y * c[k + Y + 5] + of_x * c[k + X + 4],
-        c[k + Y],
-        c[k + Y + 1],
-        c[k + Y + 2],
-        c[k + Y + 3],
-        c[k + Y + 4],
-        c[k + Y + 5],
+        c[k + Y] + zero,
+        c[k + Y + 1] + zero,
+        c[k + Y + 2] + zero,
+        c[k + Y + 3] + zero,
+        c[k + Y + 4] + zero,
+        c[k + Y + 5] + zero,
     )
     u, _, y, _ = on_section(own, 0, 1, u, rest, ROUNDS)
-    return y, missed(own, 0, 1, u, rest)
+    off, _ = missed(own, 0, 1, u, rest)
+    return y, off
 
 
 def end_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> int:

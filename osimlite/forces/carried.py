@@ -1,9 +1,12 @@
-"""What a law has to say for numbers that carry derivatives: to floats these functions do nothing new.
+"""What is said of numbers that carry derivatives: to floats these functions do nothing new.
 
-Machine code with tangents puts its own in their places.
+Machine code with tangents puts its own in their places, and so does :mod:`osimlite.simulation.engines.carrying` in
+Python.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 
 def settled(root: float, error: float, slope: float) -> float:
@@ -22,3 +25,23 @@ def settled(root: float, error: float, slope: float) -> float:
 def is_nothing(number: float) -> bool:
     """Whether a number is 0 with all its derivatives, so that what is multiplied by it can be left out."""
     return number == 0.0
+
+
+def plain(number: float) -> float:
+    """A number without derivatives."""
+    return number
+
+
+def carrying(number: float, direction: int, directions: int) -> float:
+    """A number that from here on carries derivatives along so many directions, of which it is one itself."""
+    return number
+
+
+def carrying_room(vector: Any, directions: int) -> Any:
+    """Room of floats as room of numbers that carry derivatives; each takes the place of 1 + directions."""
+    return vector
+
+
+def slope_of(number: float, direction: int) -> float:
+    """The derivative of a number along a direction."""
+    return 0.0

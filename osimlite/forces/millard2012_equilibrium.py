@@ -13,13 +13,13 @@ from math import isnan, nan
 from typing import NamedTuple
 
 from osimlite.forces.bezier import curve_integral, curve_value, value_of_sum
+from osimlite.forces.carried import plain, settled
 from osimlite.forces.muscles import (
     SIGNIFICANT,
     MuscleInputs,
     cos_pennation,
     fiber_length_along,
     first_order_activation_rate,
-    first_order_activation_slope,
 )
 
 LENGTH_ROUNDS = 200
@@ -90,23 +90,48 @@ def millard2012_equilibrium(
         velocity, active and passive fiber force (N), whether a fiber velocity was found, rate of activation (1/s),
         fiber velocity (m/s), what of the passive force is not by damping (N).
     """
-    fibers = fibers_at(now, m)
-    tendon = 0.0
+    fibers = fibers_resting(now, m, curves)
+    is_found, velocity, by_velocity = fibers.told_by != NONE, fibers.velocity, fibers.by_velocity
+    if fibers.told_by == RIGID:
+        by_velocity, _ = curve_value(curves.velocity, velocity)
+    elif fibers.told_by == DAMPED:
+        is_found, velocity, by_velocity = damped_velocity(
+            m, fibers.active, fibers.by_length, fibers.elastic, fibers.tendon, fibers.cos, curves
+        )
+    elif fibers.told_by == INVERSE:
+        velocity, _ = curve_value(curves.inverse, velocity)
+    return muscle_with(fibers, m, is_found, velocity, by_velocity, fibers.by_length, fibers.elastic, fibers.tendon)
+
+
+def millard2012_again(
+    now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves, fiber_velocity: float
+) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
+    """The same, where the velocity (m/s) that damped fibers have is known, so that its derivatives are all to find."""
+    fibers = fibers_resting(now, m, curves)
+    velocity = plain(fiber_velocity) / (m.fastest * m.optimal) if fibers.told_by == DAMPED else fibers.velocity
+    by_velocity, slope = 1.0, 0.0
+    if fibers.told_by == INVERSE:
+        velocity, _ = curve_value(curves.inverse, velocity)
+    else:
+        by_velocity, slope = curve_value(curves.velocity, velocity)
+    if fibers.told_by == DAMPED:
+        share = fibers.active * fibers.by_length
+        off = share * by_velocity + m.damping * velocity - fibers.velocity
+        velocity = settled(velocity, off, share * slope + m.damping)
+    by_length, elastic, tendon = fibers.by_length, fibers.elastic, fibers.tendon
+    return muscle_with(fibers, m, True, velocity, by_velocity, by_length, elastic, tendon)
+
+
+def fibers_resting(now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves) -> Fibers:
+    """The fibers when the curves over length were asked, those over velocity not."""
+    fibers, tendon = fibers_at(now, m), 0.0
     by_length, _ = curve_value(curves.active, fibers.by_length)
     elastic, _ = curve_value(curves.passive, fibers.by_length)
     if not m.is_rigid:
         tendon, _ = curve_value(curves.tendon, fibers.tendon)
     velocity, by_velocity, by_length, elastic, tendon = fibers_loaded(fibers, m, by_length, elastic, tendon)
-    is_found = fibers.told_by != NONE
-    if fibers.told_by == RIGID:
-        by_velocity, _ = curve_value(curves.velocity, velocity)
-    elif fibers.told_by == DAMPED:
-        is_found, velocity, by_velocity = damped_velocity(
-            m, fibers.active, by_length, elastic, tendon, fibers.cos, curves
-        )
-    elif fibers.told_by == INVERSE:
-        velocity, _ = curve_value(curves.inverse, velocity)
-    return muscle_with(fibers, m, is_found, velocity, by_velocity, by_length, elastic, tendon)
+    told_by, active, length, cos, change = fibers.told_by, fibers.active, fibers.length, fibers.cos, fibers.change
+    return Fibers(told_by, velocity, by_velocity, active, length, cos, by_length, elastic, tendon, change)
 
 
 def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> Fibers:
@@ -198,63 +223,6 @@ def muscle_with(
         tension = tendon * m.strength
     speed = velocity * m.fastest * m.optimal
     return tension, active, fiber, cos, by_length, by_velocity, pull, passive, is_found, fibers.change, speed, spring
-
-
-def millard2012_slopes(
-    now: MuscleInputs,
-    m: Millard2012Equilibrium,
-    curves: MillardCurves,
-    activation: float,
-    fiber_length: float,
-    cos_pennation: float,
-    fiber_velocity: float,
-) -> tuple[float, float, float, float, float, float, float, float, float, float, float, float]:
-    """Derivatives of the tension, of the rate of activation and of the fiber velocity.
-
-    Args:
-        now, m, curves: as of `millard2012_equilibrium`.
-        activation: what that found, with the three that follow.
-        fiber_length: m.
-        cos_pennation: of pennation.
-        fiber_velocity: m/s.
-
-    Returns:
-        Of each of the three its derivatives by length and rate of the path, activation and fiber length.
-    """
-    cos, velocity = cos_pennation, fiber_velocity / (m.fastest * m.optimal)
-    by_length, length_slope = curve_value(curves.active, fiber_length / m.optimal)
-    elastic, elastic_slope = curve_value(curves.passive, fiber_length / m.optimal)
-    by_velocity, velocity_slope = curve_value(curves.velocity, velocity)
-    # What fibers bear by their length and by their velocity, and how pennation and reach along the tendon change.
-    stiffness = (activation * length_slope * by_velocity + elastic_slope) / m.optimal
-    viscosity = activation * by_length * velocity_slope + m.damping
-    turn = m.height * m.height / (fiber_length * fiber_length * fiber_length * cos)
-    reach = cos + fiber_length * turn
-    # Beyond its bounds a state changes nothing.
-    change = first_order_activation_slope(now.excitation, now.activation, m.rising, m.falling, m.least)
-    pull = by_length * by_velocity if m.least <= now.activation < 1.0 and not m.is_excited else 0.0
-    by_path = by_rate = by_activation = by_fiber = of_path = of_activation = of_fiber = 0.0
-    is_free = fiber_length > m.smallest or fiber_velocity > 0.0
-    if m.is_rigid:
-        borne = activation * by_length * by_velocity + elastic + m.damping * velocity
-        if is_free and borne > 0.0:
-            by_path = m.strength * (stiffness * cos + borne * turn + viscosity * velocity * turn) / reach
-            by_rate = m.strength * viscosity * cos * cos / (m.optimal * m.fastest)
-            by_activation = m.strength * pull * cos
-    else:
-        tendon, tendon_slope = curve_value(curves.tendon, (now.length - fiber_length * cos) / m.slack)
-        by_path = m.strength * tendon_slope / m.slack
-        gain = 0.0
-        if is_free:
-            if not m.damping > 0.0:
-                _, inverse_slope = curve_value(curves.inverse, (tendon / cos - elastic) / (activation * by_length))
-                viscosity = activation * by_length / inverse_slope
-            gain = m.fastest * m.optimal / (viscosity * cos)
-            of_path, of_activation = gain * tendon_slope / m.slack, -gain * pull * cos
-        if now.fiber_length >= m.smallest:
-            by_fiber = -by_path * reach
-            of_fiber = -of_path * reach - gain * (stiffness * cos + tendon / cos * turn)
-    return by_path, by_rate, by_activation, by_fiber, 0.0, 0.0, change, 0.0, of_path, 0.0, of_activation, of_fiber
 
 
 def millard2012_rigid(now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves) -> float:

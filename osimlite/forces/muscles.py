@@ -48,16 +48,6 @@ def first_order_activation_rate(
     return (excitation - active) / (rising * slow if excitation > active else falling / slow)
 
 
-def first_order_activation_slope(
-    excitation: float, activation: float, rising: float, falling: float, least: float
-) -> float:
-    """Derivative of `first_order_activation_rate`, whose arguments these are, by the activation, 1/s."""
-    if not least <= activation < 1.0:
-        return 0.0
-    slow, off = 0.5 + 1.5 * activation, excitation - activation
-    return -(slow + 1.5 * off) / (rising * slow * slow) if off > 0.0 else (1.5 * off - slow) / falling
-
-
 def pennation(optimal_length: float, optimal_angle: float, largest_angle: float) -> tuple[float, float, float, float]:
     """What the laws are given of pennation.
 

@@ -7,6 +7,7 @@ from functools import cached_property
 from inspect import signature
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from osimlite.forces.carried import carrying, carrying_room, slope_of
 from osimlite.kernels.condensation import WIDTH
 from osimlite.kernels.curves_abreast import LANES, answer, ask, ask_sum, missed_of, value_of
 from osimlite.kernels.layout import ITEM
@@ -20,10 +21,6 @@ if TYPE_CHECKING:
 
 SOLVED = "solved"
 """The output that tells whether the law has a solution; without it, it always has one."""
-
-SMALL_CHANGE = 1e-7
-"""Of lengths (m), angles, speeds and states, to find derivatives."""
-
 
 SOUGHT_ROUNDS = 4
 """Of a search for a sum, from between the ends of a section."""
@@ -105,31 +102,32 @@ class KernelText:
         A row for the force and for the rate of each state, see :mod:`osimlite.kernels.condensation`. The moment is that
         of the last evaluation, whose record tells what that has found.
         """
-        kind, outputs, law = self.kind, self.kind.outputs, self.kind.law
-        force, _ = kind.geometry.along
-        rows, changed = (force, *(state.rate for state in kind.states)), self._changed
-        if kind.slopes is not None and law is not None:
-            found = [name for name in signature(kind.slopes).parameters if name not in signature(law).parameters]
-            arguments = [*self._arguments, *(f"found[{kind.recorded[name]}]" for name in found)]
-            law, slopes = kind.slopes, [f"{name}_{column + 1}" for name in rows for column in changed]
-            lines = [f"{', '.join(slopes)} = {self._call(arguments)}"]
-            slope = "{0}_{1}"
-        else:
-            # A rate may have the name of an output of another meaning, such as that of a state.
-            lines = [f"{', '.join(f'{name}_0' for name in outputs)} = {self._call(self._arguments)}"]
-            for column, place in changed.items():
-                arguments = self._arguments
-                arguments[place] += f" + {SMALL_CHANGE}"
-                results = ", ".join(f"{name}_{column + 1}" for name in outputs)
-                lines.append(f"{results} = {self._call(arguments)}")
-            slope = f"({{0}}_{{1}} - {{0}}_0) / {SMALL_CHANGE}"
+        kind, force = self.kind, self.kind.geometry.along[0]
+        rows, changed, arguments = (force, *(state.rate for state in kind.states)), self._changed, self._arguments
+        directions = {column: direction for direction, column in enumerate(changed)}
+        law, count = kind.again or kind.law, len(changed)
+        for column, place in changed.items():
+            arguments[place] = f"carrying({arguments[place]}, {directions[column]}, {count})"
+        # Formulas compute in the record; controls have what reflexes add to them.
+        arguments = [
+            f"carrying_room({each}, {count})" if each.startswith("at(found") else each.replace(", rate)", ", 0.0)")
+            for each in arguments
+        ]
+        if kind.again is not None and kind.law is not None:
+            given = signature(kind.law).parameters
+            arguments += [
+                f"found[{kind.recorded[name]}]" for name in signature(kind.again).parameters if name not in given
+            ]
+        # A rate may have the name of an output of another meaning, such as that of a state.
+        lines = [f"{', '.join(f'{name}_0' for name in kind.outputs)} = {self._call(arguments)}"]
         lines += [f"{force} = 1.0", *kind.geometry.after, "change = at(w, WORK.SCRATCH)"]
         for row, name in enumerate(rows):
             for column in range(WIDTH):
-                value = slope.format(name, column + 1) if column in changed else "0.0"
+                value = f"slope_of({name}_0, {directions[column]})" if column in directions else "0.0"
                 lines.append(f"change[{WIDTH * row + column}] = {value}")
         lines[:0] = *self._places_of_item, *(kind.geometry.again or kind.geometry.before)
-        return self._written(RESPONSE, "item", lines, law=law)
+        carried = {function.__name__: function for function in (carrying, carrying_room, slope_of)}
+        return self._written(RESPONSE, "item", lines, law=law, **carried)
 
     @cached_property
     def abreast_kernel(self) -> Callable[..., int]:

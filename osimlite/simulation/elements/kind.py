@@ -84,9 +84,8 @@ class Kind:
     settled: tuple[str, ...] = ()  # names of the states that it finds
     # force (N) of fully active fibers along a rigid tendon, from what the law is given; of muscles
     rigid: Callable[..., float] | None = None
-    # derivatives of the force and of each rate by displacement, its speed and each state that the law is given, row
-    # by row, from what the law is given and what its other parameters name of the record; differences if None
-    slopes: Callable[..., Any] | None = None
+    # the law where its results are known, given also those that its other parameters name of the record; of derivatives
+    again: Callable[..., Any] | None = None
     # name of the kernel that tells how the force of a contact changes along its normal and across it
     contact_response: str = ""
     abreast: Abreast | None = None  # the law in parts, which several forces take together

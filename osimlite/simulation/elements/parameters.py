@@ -258,7 +258,8 @@ class Expression(Parameter):
         """Places of steps (their count first), constants and registers."""
         steps, constants = program(value)
         count = len(steps) // 3
-        registers = tail.put_room(len(self.variables) + count)
+        # Where they are to carry derivatives, these are by the variables.
+        registers = tail.put_room((1 + len(self.variables)) * (len(self.variables) + count))
         return (tail.put_ints((count, *steps)), tail.put_numbers(constants), registers), ()
 
 

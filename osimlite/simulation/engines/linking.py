@@ -17,7 +17,8 @@ from osimlite.kernels import pointers
 from osimlite.kernels.layout import MODEL, OUTCOME
 from osimlite.kernels.pointers import Ints
 from osimlite.kernels.table import LAW_NUMBERS
-from osimlite.simulation.elements.laws import ALONG, law_function
+from osimlite.simulation.elements.laws import ALONG, RESPONSE, law_function
+from osimlite.simulation.engines.carrying import carried_by
 from osimlite.simulation.interrupts import defer_sigint
 from osimlite.simulation.pack import Packed
 
@@ -172,7 +173,8 @@ class _Python(Code):
         pass
 
     def address(self, function: str) -> int:
-        return pointers.address(law_function(function))
+        law = law_function(function)
+        return pointers.address(carried_by(law) if function.endswith(RESPONSE) else law)
 
     def entry(self, function: str) -> Callable[..., int]:
         kernel = law_function(function)

@@ -80,5 +80,5 @@ def _settings() -> str:
     return hashlib.sha256(b"\0".join((here.with_name(name)).read_bytes() for name in SETTINGS)).hexdigest()
 
 
-SETTINGS = ("compiler.py", "object_code.py", "tangents.py")
+SETTINGS = ("carrying.py", "compiler.py", "object_code.py", "tangents.py")
 """The modules that set the compiler."""

@@ -17,9 +17,10 @@ from numba.core import types
 from numba.core.datamodel.models import PrimitiveModel
 from numba.core.typeconv.castgraph import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import lower_builtin, lower_cast, register_model
+from numba.extending import intrinsic, lower_builtin, lower_cast, register_model
 
-from osimlite.forces.carried import is_nothing, settled
+from osimlite.forces.carried import carrying, carrying_room, is_nothing, plain, settled, slope_of
+from osimlite.simulation.engines.carrying import SLOPES
 
 DOUBLE, PLACE = ir.DoubleType(), ir.IntType(32)
 PLAIN = types.Number, types.Boolean
@@ -234,33 +235,8 @@ def _through(function: Any, *slopes: Callable[..., float], value: Callable[..., 
     _lowered(function, len(slopes), lowering)
 
 
-# Where a slope has no end, at the edge of what a function is defined for, it counts as 0.
-_through(operator.neg, lambda x, f: -1.0)
-_through(abs, lambda x, f: -1.0 if x < 0.0 else 1.0)
-_through(float, lambda x, f: 1.0, value=lambda x: x)
-_through(math.sqrt, lambda x, f: 0.5 / f if x > 0.0 else 0.0)
-_through(math.sin, lambda x, f: math.cos(x))
-_through(math.cos, lambda x, f: -math.sin(x))
-_through(math.tan, lambda x, f: 1.0 + f * f)
-_through(math.asin, lambda x, f: 1.0 / math.sqrt(1.0 - x * x) if abs(x) < 1.0 else 0.0)
-_through(math.acos, lambda x, f: -1.0 / math.sqrt(1.0 - x * x) if abs(x) < 1.0 else 0.0)
-_through(math.atan, lambda x, f: 1.0 / (1.0 + x * x))
-_through(math.exp, lambda x, f: f)
-_through(math.log, lambda x, f: 1.0 / x)
-_through(math.sinh, lambda x, f: math.cosh(x))
-_through(math.cosh, lambda x, f: math.sinh(x))
-_through(math.tanh, lambda x, f: 1.0 - f * f)
-_through(math.erf, lambda x, f: 1.1283791670955126 * math.exp(-x * x))
-_through(math.erfc, lambda x, f: -1.1283791670955126 * math.exp(-x * x))
-_through(math.radians, lambda x, f: 0.017453292519943295)
-_through(math.atan2, lambda y, x, f: x / (x * x + y * y), lambda y, x, f: -y / (x * x + y * y))
-_through(math.copysign, lambda x, y, f: 1.0 if (x < 0.0) == (f < 0.0) else -1.0, lambda x, y, f: 0.0)
-_through(operator.mod, lambda x, y, f: 1.0, lambda x, y, f: (f - x) / y)
-_through(
-    operator.pow,
-    lambda x, y, f: y * x ** (y - 1.0) if y != 0.0 else 0.0,
-    lambda x, y, f: f * math.log(x) if x > 0.0 else 0.0,
-)
+for _function, _slopes in SLOPES.items():
+    _through(_function, *_slopes, value=(lambda x: x) if _function is float else None)
 
 
 def _of_value(function: Any, result: Any, value: Callable[..., Any]) -> None:
@@ -316,5 +292,52 @@ def _compare_to_nothing(context: Any, builder: Any, sig: Any, given: Any) -> Any
     return result
 
 
-INSTRUCTIONS: dict[Any, Any] = {settled: settled, is_nothing: is_nothing}
+@intrinsic
+def _plain_part(context: Any, number: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        ((value, _),) = _parts(builder, signature.args, given)
+        return value
+
+    return signature(types.float64, number if isinstance(number, Dual) else types.float64), generate
+
+
+@intrinsic(prefer_literal=True)
+def _carrying(context: Any, number: Any, direction: Any, directions: Any) -> Any:
+    place, count = direction.literal_value, directions.literal_value
+
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        return _made(
+            builder, given[0], ir.Constant(ir.VectorType(DOUBLE, count), [float(k == place) for k in range(count)])
+        )
+
+    return signature(Dual(count), types.float64, direction, directions), generate
+
+
+@intrinsic(prefer_literal=True)
+def _carrying_room(context: Any, vector: Any, directions: Any) -> Any:
+    room = Duals(Dual(directions.literal_value))
+
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        return builder.bitcast(given[0], context.get_value_type(room))
+
+    return signature(room, vector, directions), generate
+
+
+@intrinsic(prefer_literal=True)
+def _slope_of(context: Any, number: Any, direction: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        ((_, change),) = _parts(builder, signature.args[:1], given[:1])
+        return DOUBLE(0.0) if change is None else builder.extract_element(change, PLACE(direction.literal_value))
+
+    return signature(types.float64, number, direction), generate
+
+
+INSTRUCTIONS: dict[Any, Any] = {
+    settled: settled,
+    is_nothing: is_nothing,
+    plain: _plain_part,
+    carrying: _carrying,
+    carrying_room: _carrying_room,
+    slope_of: _slope_of,
+}
 """Functions of ours that machine code, that of floats too, has its own of."""

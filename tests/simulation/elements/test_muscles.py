@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -11,22 +10,17 @@ import numpy as np
 import pytest
 
 from osimlite.errors import ModelError, SimulationError
-from osimlite.forces.muscles import MuscleInputs
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.extremes import any_numbers
 from osimlite.schema.muscle_curves import ActiveForceLengthCurve, ForceVelocityCurve, TendonForceLengthCurve
 from osimlite.schema.path_actuators import PathActuator
-from osimlite.schema.registry import class_for
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.elements.kind import kind_of_class
 from osimlite.simulation.system import System
 from tests.simulation.checked import Checked
 from tests.simulation.elements.muscle_rows import CONFIGURATIONS, FOLDER, hung, muscle, table
 
 CASES = [name for name, settings in CONFIGURATIONS.items() if (FOLDER / f"{settings['cls']}.csv.gz").exists()]
-SLOPING = "Millard2012EquilibriumMuscle"
-"""What has slopes of its own."""
 RECORDED = {
     "tension": "Actuation",
     "activation": "Activation",
@@ -101,39 +95,6 @@ def test_derivatives_forces_and_energy(case, code):
         # OpenSim's integrals of Millard's curves are splines.
         close = 1e-4 if "millard" in case else 1e-8
         assert ready.energies(float(number), y)[2] == pytest.approx(stored, rel=close, abs=0.001 * close)
-
-
-@pytest.mark.parametrize("case", [name for name in CASES if CONFIGURATIONS[name]["cls"] in SLOPING])
-def test_slopes_are_those_of_the_law(case):
-    """Or between those below and above, where the law has a kink."""
-    kind = kind_of_class(class_for(CONFIGURATIONS[case]["cls"]))
-    rows = [row for row in table(kind.component.__name__, case) if not row["error"]][::2]
-    (element,) = system(hung(muscle(case))).forces.elements
-    _, *own = element.values
-    inputs = "length", "rate", *(state.name for state in kind.states)
-    own_states = [state for state in kind.states if rows[0].get(state.name)]
-    rates = ["tension", *(state.rate for state in own_states)]
-    scale = np.array([element.known([0.0] * len(kind.recorded))["max_isometric_force"], *[1.0] * len(own_states)])
-
-    def law(**inputs):
-        return dict(zip(kind.outputs, kind.law(now._replace(**inputs), *own), strict=True))
-
-    for row in rows:
-        states = {state.name: float(row[state.name]) for state in own_states}
-        now = MuscleInputs(float(row["path_length"]), float(row["path_speed"]), float(row["excitation"]), **states)
-        here = law()
-        given = [here[name] for name in list(signature(kind.slopes).parameters)[1 + len(own) :]]
-        every = np.reshape(kind.slopes(now, *own, *given), (1 + len(kind.states), len(inputs)))
-        slopes = every[[0, *(1 + kind.states.index(state) for state in own_states)]]
-        for name in ("length", "rate", *states):
-            slope, value = slopes[:, inputs.index(name)], getattr(now, name)
-            aside = [
-                np.array([(law(**{name: value + off})[rate] - here[rate]) / off for rate in rates])
-                for off in (-1e-7, 1e-7)
-            ]
-            slight = 1e-3 * np.abs(slope) + 1e-2 * scale
-            assert np.all(np.minimum(*aside) - slight <= slope), (row, name)
-            assert np.all(slope <= np.maximum(*aside) + slight), (row, name)
 
 
 @pytest.mark.parametrize("code", [None, Checked("Python")], ids=["compiled", "Python"])

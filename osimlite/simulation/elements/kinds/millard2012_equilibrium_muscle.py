@@ -12,11 +12,11 @@ from osimlite.forces.millard2012_equilibrium import (
     fibers_at,
     fibers_loaded,
     fibers_moved,
+    millard2012_again,
     millard2012_energy,
     millard2012_equilibrium,
     millard2012_equilibrium_length,
     millard2012_rigid,
-    millard2012_slopes,
     muscle_of,
 )
 from osimlite.forces.muscle_curves import (
@@ -143,7 +143,7 @@ KIND = muscle(
     equilibrium=millard2012_equilibrium_length,
     settled=("fiber_length",),
     rigid=millard2012_rigid,
-    slopes=millard2012_slopes,
+    again=millard2012_again,
     abreast=Abreast(
         Fibers,
         fibers_at,

@@ -1,0 +1,108 @@
+"""The derivatives of forces along displacements, for implicit integrators, are those of numbers that carry theirs."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from osimlite.kernels import pointers
+from osimlite.kernels.condensation import INVERSE, OF_ITEM, WIDTH
+from osimlite.kernels.layout import MODEL, OUTCOME, STAGE, WORK
+from osimlite.multibody import build_mechanism
+from osimlite.simulation import Simulation
+from osimlite.simulation.elements import force_elements
+from osimlite.simulation.elements.kind import DeclaredForce
+from osimlite.simulation.elements.laws import RESPONSE
+from osimlite.simulation.engines.linking import COMPILED
+from osimlite.simulation.system import System
+from tests.backends.jets import Jet, _carried
+from tests.simulation.checked import Checked
+from tests.simulation.elements.muscle_rows import CONFIGURATIONS, hung, muscle
+from tests.simulation.force_cases import FORCES, with_force
+
+pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+
+STATES = 2
+
+
+def jets_of(kind: Any, given: tuple[Any, ...]) -> tuple[list[Any], list[int]]:
+    """What a law was given, with jets for what its response is by, and the columns of these."""
+    changed, count = kind.text._changed, len(kind.text._changed)
+    names = [*kind.text._inputs, "excitation", *(state.name for state in kind.states if state.given)]
+    flat = [getattr(given[0], name) for name in names] if kind.together else [*given]
+    none = np.zeros(count)
+    for direction, place in enumerate(changed.values()):
+        flat[place] = Jet(float(flat[place]), np.eye(count)[direction], 0.0, none)
+    # Registers of formulas take jets.
+    rest = [
+        part.astype(object) if isinstance(part, np.ndarray) else part for part in given[1 if kind.together else 0 :]
+    ]
+    if kind.together:
+        return [given[0]._replace(**dict(zip(names, flat, strict=True))), *rest], [*changed]
+    return [flat[k] if isinstance(flat[k], Jet) else part for k, part in enumerate(rest)], [*changed]
+
+
+@pytest.mark.parametrize("case", [*FORCES, *CONFIGURATIONS])
+def test_they_are_derivatives_of_the_law(case, monkeypatch):
+    """In machine code and in Python; of whichever side the law takes where it bends."""
+    is_muscle = case in CONFIGURATIONS
+    model = hung(muscle(case), (0.4, 0.6)) if is_muscle else with_force(FORCES[case])
+    if is_muscle:
+        model["/jointset/slide/x"].default_value = 0.322
+    mechanism = build_mechanism(model)
+    forces = force_elements(model, mechanism)
+    with Simulation(model, "compiled") as simulation:
+        start = np.array(simulation.initial_state({}, {}))
+    code, python = (System(mechanism, forces, code=each) for each in (COMPILED, Checked("Python")))
+    size, rng = int(code.structure[MODEL.DOFS]), np.random.default_rng(1)
+    for system in (code, python):
+        system.program.link_responses("bdf")
+    given: dict[str, tuple[Any, ...]] = {}
+    for kind in {force.kind for force in forces.elements if isinstance(force, DeclaredForce)}:
+        if kind.text.responds:
+            noted = partial(_noted, given, kind)
+            monkeypatch.setitem(kind.text.kernel.__globals__, "law", noted)
+    for _ in range(STATES):
+        y = start * rng.uniform(0.9, 1.1, len(start))
+        y[start == 0.0] = rng.uniform(0.05, 0.3, np.count_nonzero(start == 0.0))
+        y[:size] += (0.01 if is_muscle else 0.2) * rng.normal(size=size)
+        y[size : 2 * size] += rng.normal(size=size)
+        found = []
+        for system in (python, code):
+            assert system.realize(0.3, y.tolist(), STAGE.ACCELERATION) == OUTCOME.OK
+            found.append(responses(system, y))
+        for name, row in found[0].items():
+            assert row == pytest.approx(found[1][name], rel=1e-12, abs=1e-12), name
+        for kind, own in given.values():
+            name = kind.name + RESPONSE
+            slopes = found[0][name].reshape(-1, WIDTH)
+            carried, columns = jets_of(kind, own)
+            with _carried([kind.law]):
+                results = kind.law(*carried)
+            results = dict(zip(kind.outputs, results if isinstance(results, tuple) else (results,), strict=True))
+            for row, output in zip(slopes, (kind.geometry.along[0], *(s.rate for s in kind.states)), strict=False):
+                result = results[output]
+                wanted = np.zeros(WIDTH)
+                if isinstance(result, Jet):
+                    wanted[columns] = result.g
+                assert row == pytest.approx(wanted, rel=1e-9, abs=1e-9 * (1.0 + np.abs(wanted).max())), output
+
+
+def _noted(given: dict[str, Any], kind: Any, *own: Any) -> Any:
+    given[kind.name] = kind, own
+    return kind.law(*own)
+
+
+def responses(system: System, y: np.ndarray) -> dict[str, np.ndarray]:
+    """The derivatives of each force, by the name of what finds them."""
+    s, result = system.program.ints, {}
+    for place, name in system.program._responses.items():
+        kernel = system.program.code.bound(name, s, system.numbers, system._w, y, np.zeros(len(y)))
+        if isinstance(system.program.code, Checked):
+            kernel = partial(pointers.call, int(s[place]), s, system.numbers, system._w, y, np.zeros(len(y)))
+        assert kernel(int(s[place + OF_ITEM])) == OUTCOME.OK
+        result[name] = np.array(system._w[WORK.SCRATCH : WORK.SCRATCH + INVERSE])
+    return result
