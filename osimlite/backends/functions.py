@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from osimlite.backends.stated import StatedModel
+from osimlite.backends.tangents import TangentModel
 from osimlite.errors import SettingError, UnsupportedError
 from osimlite.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.multibody import build_mechanism
@@ -109,6 +110,12 @@ class CasadiModel(StatedModel):
         # Ways that are searched for may not change: lengths are no lines over anything.
         ways = [searched.measured(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)] if searched.size else []
         return np.concatenate((packed.numbers, *_fixed_numbers(mechanism, packed), *ways))
+
+    def in_tangents(self) -> TangentModel:
+        """The same in machine code, with the values that the parameters have here."""
+        result = TangentModel(self._model, self.parameters, self._folder)
+        result.take(self.p)
+        return result
 
     # ----------------------------------------------------------------------------------------------- tracing
     @cached_property

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.backends.functions import CasadiModel, casadi
+from osimlite.backends.functions import CasadiModel
 from osimlite.backends.tangents import TangentModel, tangents
 from osimlite.errors import SettingError
 from osimlite.multibody.spatial import Array
@@ -68,10 +68,10 @@ def linearize(
 
     Args:
         model: that moves; or what is made of it once for many states: its tangents (:func:`osimlite.tangents`), or
-            its functions (:func:`osimlite.casadi`), which outputs need.
+            its functions (:func:`osimlite.casadi`), whose tangents these are then.
         state: numbers by the names of states, the others as the model has them, or all (x,) in their order.
         controls: numbers by the paths of actuators, the others 0, or all (u,).
-        outputs: what is observed, in the order of y: groups of `CasadiModel.output_names` (``mass_center``), or single
+        outputs: what is observed, in the order of y: groups of `TangentModel.output_names` (``mass_center``), or single
             entries of these (``mass_center:y``, ``forces:/forceset/soleus_r|tension``).
         time: s.
         folder: where the model's file is, for the files that it names; the folder that the program runs in if None.
@@ -79,31 +79,26 @@ def linearize(
     Raises:
         SettingError: there is no such state, control or output.
 
-    Other errors are those of :func:`osimlite.tangents`, and with outputs of :func:`osimlite.casadi`.
+    Other errors are those of :func:`osimlite.tangents`.
     """
-    if not isinstance(model, TangentModel | CasadiModel):
-        model = (casadi if outputs else tangents)(model, (), folder)
+    if isinstance(model, Model):
+        model = tangents(model, (), folder)
+    elif not isinstance(model, TangentModel):
+        model = model.in_tangents()
     x = _filled("state", model.states, model.x, state)
     u = _filled("control", model.controls, model.u, controls)
-    xdot, a, b = (np.array(part) for part in model.linear(time, x, u, model.p))
-    y, c, d = (np.zeros((0, size)) for size in (1, len(x), len(u)))
-    names: tuple[str, ...] = ()
-    if outputs:
-        if not isinstance(model, CasadiModel):
-            raise SettingError("outputs need functions of CasADi; give those (osimlite.casadi), or the model")
-        chosen = _chosen(model, outputs)
-        y, c, d = _observed(model, chosen, time, x, u)
-        names = tuple(f"{group}:{model.output_names[group][k]}" for group, k in chosen)
-    return Linearization(model.states, model.controls, time, x, u, xdot.ravel(), a, b, names, y[:, 0], c, d)
+    xdot, a, b = model.linear(time, x, u)
+    chosen = _chosen(model.output_names if outputs else {}, outputs)
+    y, c, d = model.observed(time, x, u, chosen) if outputs else (np.zeros((0, size)) for size in (1, len(x), len(u)))
+    names = tuple(f"{group}:{model.output_names[group][k]}" for group, k in chosen)
+    return Linearization(model.states, model.controls, time, x, u, xdot, a, b, names, y.ravel(), c, d)
 
 
-def _chosen(model: CasadiModel, names: Sequence[str]) -> list[tuple[str, int]]:
+def _chosen(output_names: Mapping[str, Sequence[str]], names: Sequence[str]) -> list[tuple[str, int]]:
     """The groups of outputs and the places in these that names stand for."""
-    groups = {group: [(group, k) for k in range(len(labels))] for group, labels in model.output_names.items()}
+    groups = {group: [(group, k) for k in range(len(labels))] for group, labels in output_names.items()}
     single = {
-        f"{group}:{label}": [(group, k)]
-        for group, labels in model.output_names.items()
-        for k, label in enumerate(labels)
+        f"{group}:{label}": [(group, k)] for group, labels in output_names.items() for k, label in enumerate(labels)
     }
     known, result = {**groups, **single}, list[tuple[str, int]]()
     for name in names:
@@ -111,18 +106,6 @@ def _chosen(model: CasadiModel, names: Sequence[str]) -> list[tuple[str, int]]:
             raise SettingError(f"the model has no output '{name}'{did_you_mean(name, known)}")
         result += known[name]
     return result
-
-
-def _observed(model: CasadiModel, chosen: Sequence[tuple[str, int]], time: float, x: Array, u: Array) -> list[Array]:
-    """Outputs (y, 1), and their derivatives by the state and by the controls."""
-    from osimlite.backends.symbols import casadi as library
-
-    state, control = library.MX.sym("x", len(x)), library.MX.sym("u", len(u))
-    columns = model.outputs.call({"t": time, "x": state, "u": control, "p": model.p})
-    y = library.vertcat(*(columns[group][k] for group, k in chosen))
-    slopes = [library.jacobian(y, of) for of in (state, control)]
-    found = library.Function("observed", [state, control], [y, *slopes])(x, u)
-    return [np.array(part.full()) for part in found]
 
 
 def _filled(what: str, names: Sequence[str], default: Array, given: Any) -> Array:

@@ -1,13 +1,13 @@
-"""What is known of a state besides its derivative, as formulas: where points are, forces, muscles, paths."""
+"""What is known of a state besides its derivative: where points are, forces, muscles, paths.
+
+As formulas, or as numbers that carry derivatives: `found` runs the kernels on whichever it has.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from osimlite.backends.symbolic import on_symbols
-from osimlite.backends.symbols import casadi
-from osimlite.backends.traced import Evaluated
 from osimlite.kernels.layout import INERTIA_AT, LINK, LINK_WORK, MODEL
 from osimlite.kernels.parts import link_ints
 from osimlite.kernels.paths import LENGTH, SPEED
@@ -21,6 +21,12 @@ from osimlite.simulation.elements.geometries.sphere_on_plane import SPHERE_ON_PL
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.pack import Packed
+
+if TYPE_CHECKING:
+    from osimlite.backends.tangents import Seen
+    from osimlite.backends.traced import Evaluated
+
+    Found: TypeAlias = Evaluated | Seen
 
 AXES = "xyz"
 
@@ -37,6 +43,11 @@ def frame_places(mechanism: Mechanism, packed: Packed) -> dict[str, tuple[int, l
     return {path: places.frame(placed.body, placed.transform) for path, placed in mechanism.frames.items()}
 
 
+def probe_places(packed: Packed, elements: Sequence[Any]) -> list[int]:
+    """Places of the items of all probes."""
+    return [place for place, owner in packed.owners.items() if isinstance(elements[owner], DeclaredProbe)]
+
+
 def frame_columns(found: Evaluated, frames: Sequence[tuple[int, Sequence[Any]]]) -> dict[str, Any]:
     """What `CasadiModel.frames` gives of a state.
 
@@ -44,14 +55,16 @@ def frame_columns(found: Evaluated, frames: Sequence[tuple[int, Sequence[Any]]])
         found: of the state, up to its speeds.
         frames: link, and axes and origin in the link (12,), which may be symbols.
     """
+    from osimlite.backends.symbols import casadi
+
     columns: list[list[Any]] = [[], [], [], []]
     for link, numbers in frames:
-        origin = on_symbols(station)(found.s, found.w, link, tuple(numbers[9:]))
+        origin = found.on(station)(found.s, found.w, link, tuple(numbers[9:]))
         columns[0] += origin
         for axis in range(3):
-            columns[1] += on_symbols(direction)(found.s, found.w, link, tuple(numbers[3 * axis : 3 * axis + 3]))
-        columns[2] += on_symbols(velocity)(found.s, found.w, link, origin)
-        columns[3] += on_symbols(angular_velocity)(found.s, found.w, link)
+            columns[1] += found.on(direction)(found.s, found.w, link, tuple(numbers[3 * axis : 3 * axis + 3]))
+        columns[2] += found.on(velocity)(found.s, found.w, link, origin)
+        columns[3] += found.on(angular_velocity)(found.s, found.w, link)
     names = "position", "rotation", "velocity", "angular_velocity"
     sizes = 3, 9, 3, 3
     return {
@@ -61,7 +74,7 @@ def frame_columns(found: Evaluated, frames: Sequence[tuple[int, Sequence[Any]]])
 
 
 def output_columns(
-    mechanism: Mechanism, packed: Packed, forces: Forces, found: Evaluated, points: Sequence[Any]
+    mechanism: Mechanism, packed: Packed, forces: Forces, found: Found, points: Sequence[Any]
 ) -> dict[str, tuple[list[str], Any]]:
     """Columns and the names of their entries, as of `CasadiModel.outputs`.
 
@@ -72,7 +85,7 @@ def output_columns(
         found: of the state.
         points: in their links, of all stations (3 k,), which may be symbols.
     """
-    at_station, speed_of = on_symbols(station), on_symbols(velocity)
+    at_station, speed_of = found.on(station), found.on(velocity)
     labels: list[str] = []
     places: list[Any] = []
     speeds: list[Any] = []
@@ -106,7 +119,7 @@ def output_columns(
     }
 
 
-def _mass_center(mechanism: Mechanism, packed: Packed, found: Evaluated) -> tuple[list[Any], list[Any]]:
+def _mass_center(mechanism: Mechanism, packed: Packed, found: Found) -> tuple[list[Any], list[Any]]:
     """Where the mass centre of all bodies is, and how it moves."""
     parts = []
     for link in range(int(packed.structure[MODEL.LINKS])):
@@ -118,15 +131,15 @@ def _mass_center(mechanism: Mechanism, packed: Packed, found: Evaluated) -> tupl
             parts.append((own.mass, GROUND, tuple((frame[:3, :3] @ own.center + frame[:3, 3]).tolist())))
     total, center, rate = 0.0, [0.0] * 3, [0.0] * 3
     for mass, link, point in parts:
-        place = on_symbols(station)(found.s, found.w, link, point)
-        moves = on_symbols(velocity)(found.s, found.w, link, place)
+        place = found.on(station)(found.s, found.w, link, point)
+        moves = found.on(velocity)(found.s, found.w, link, place)
         total = total + mass
         center = [a + mass * b for a, b in zip(center, place, strict=True)]
         rate = [a + mass * b for a, b in zip(rate, moves, strict=True)]
     return [a / total for a in center], [a / total for a in rate]
 
 
-def _contacts(packed: Packed, forces: Forces, found: Evaluated) -> list[tuple[str, Any]]:
+def _contacts(packed: Packed, forces: Forces, found: Found) -> list[tuple[str, Any]]:
     """Force and point of each contact, which stand at the beginning of what the kernels know of it."""
     pairs: list[tuple[str, int]] = []
     for element, items in zip(forces.elements, packed.items, strict=True):
@@ -173,9 +186,11 @@ def joint_load_columns(
         sign: 1 if the load acts on what the joint carries, -1 if on what carries the joint.
         pushes: links that a constraint pushes, its multiplier, and the wrench of a unit of that.
     """
+    from osimlite.backends.symbols import casadi
+
     beyond = {link}
     for later in range(link + 1, found.s[MODEL.LINKS]):
-        if on_symbols(link_ints)(found.s, later)[LINK.PARENT] in beyond:
+        if found.on(link_ints)(found.s, later)[LINK.PARENT] in beyond:
             beyond.add(later)
     first = found.s[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
     wrench = casadi.vertcat(*found.w[first + LINK_WORK.WRENCH : first + LINK_WORK.WRENCH + 6])
@@ -183,7 +198,7 @@ def joint_load_columns(
         if of in beyond:
             wrench -= multiplier * casadi.vertcat(*unit)
     wrench *= -sign
-    place = on_symbols(station)(found.s, found.w, origin[0], tuple(origin[1]))
+    place = found.on(station)(found.s, found.w, origin[0], tuple(origin[1]))
     start = found.w[first + LINK_WORK.ORIGIN : first + LINK_WORK.ORIGIN + 3]
     arm = casadi.vertcat(*place) - casadi.vertcat(*start)
     moment = wrench[:3] - casadi.cross(arm, wrench[3:])

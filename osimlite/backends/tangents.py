@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from osimlite._require import require
+from osimlite.backends.outputs import output_columns, probe_places, station_places
 from osimlite.backends.stated import StatedModel
 from osimlite.errors import UnsupportedError
 from osimlite.kernels import merson
-from osimlite.kernels.layout import MODEL, OUTCOME, STAGE, WORK
+from osimlite.kernels.layout import CONSTRAINED, CONSTRAINT, ITEM, MODEL, OUTCOME, STAGE, WORK
 from osimlite.kernels.method import ACCEPTED, ERRORS, LAST_TIME, NEXT_STEP, REACHED
 from osimlite.multibody.spatial import Array
 from osimlite.records import replace
 from osimlite.schema.model import Model, expect_model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
+from osimlite.simulation.engines.carrying import Carrying, carried_by
 from osimlite.simulation.engines.linking import Program, Tangents, has_compiler
 from osimlite.simulation.integrators import MERSON
 from osimlite.simulation.pack import Packed, pack
@@ -138,6 +141,7 @@ class TangentModel(StatedModel):
         dx: Array,
         du: Array | None = None,
         dp: Array | None = None,
+        look: Callable[[slice, slice], None] | None = None,
     ) -> tuple[Array, Array]:
         """The rates (x,), and their derivatives (x, m) along m directions.
 
@@ -148,6 +152,7 @@ class TangentModel(StatedModel):
             dx: directions of the state (x, m).
             du: of the controls (u, m); 0 if left out.
             dp: of the parameters (p, m); 0 if left out.
+            look: called after each evaluation, with the directions that it had and their places behind a number.
         """
         machine, y, f = self._machine, self._y, self._f
         y[self._places, 0], self._driven[:, 0] = x, u
@@ -161,9 +166,83 @@ class TangentModel(StatedModel):
                 self.put_along(dp[:, part], machine.x[:, own])
             if self._evaluate(STAGE.ACCELERATION) == OUTCOME.OK:
                 rates, result[:, part] = f[self._places, 0], f[self._places, own]
+                if look is not None:
+                    look(part, own)
         if dp is not None:
             machine.x[:, 1:] = 0.0
         return rates, result
+
+    @cached_property
+    def output_names(self) -> dict[str, tuple[str, ...]]:
+        """What is known of a state, by groups, and the names of the entries of each; see `CasadiModel.outputs`."""
+        return {group: tuple(labels) for group, (labels, _) in self._outputs().items()}
+
+    def observed(self, t: float, x: Array, u: Array, chosen: Sequence[tuple[str, int]]) -> tuple[Array, Array, Array]:
+        """Outputs (y,), and their derivatives by the state (y, x) and by the controls (y, u).
+
+        Args:
+            t: time, s.
+            x: state (x,).
+            u: controls (u,).
+            chosen: of each output its group, and its place among `output_names` of that.
+        """
+        size = len(x)
+        both = np.eye(size + len(u))
+        y, slopes = np.full(len(chosen), np.nan), np.full((len(chosen), size + len(u)), np.nan)
+
+        def look(part: slice, own: slice) -> None:
+            for place, probe in self._probes:
+                probe(place)
+            known = self._outputs()
+            for row, (group, k) in enumerate(chosen):
+                number = known[group][1][k]
+                y[row] = number
+                slopes[row, part] = number.slopes[: own.stop - 1] if isinstance(number, Carrying) else 0.0
+
+        self.along(t, x, u, both[:size], both[size:], look=look)
+        return y, slopes[:, :size], slopes[:, size:]
+
+    def _outputs(self) -> dict[str, tuple[list[str], list[Any]]]:
+        """Of the state that was evaluated last."""
+        points = [axis for _, _, point in station_places(self.mechanism, self._packed) for axis in point]
+        machine = self._machine
+        found = Seen(machine.program.ints, machine.x, machine.w)
+        return output_columns(self.mechanism, self._packed, self.forces, found, points)
+
+    @cached_property
+    def _probes(self) -> list[tuple[int, Callable[[int], int]]]:
+        """Places of the items of probes, and what computes them."""
+        places, kernels = probe_places(self._packed, self.forces.elements), self._packed.kernels
+        return [(place, self._machine.entry(str(kernels[place + ITEM.LAW]), self._y, self._f)) for place in places]
+
+    def bound(self, t: float, x: Array) -> tuple[Array, Array]:
+        """The derivatives of the errors of constraints at positions (m, x + p) and at speeds (k, x + p).
+
+        They are by the state and by the parameters; in units of the equations, m and rad, m/s and rad/s.
+        """
+        s, w, y, size = self._machine.program.ints, self._machine.w, self._y, len(x)
+        h, freedoms = s[s[MODEL.CONSTRAINED] :], int(s[MODEL.DOFS])
+        count = int(h[CONSTRAINED.EQUATIONS])
+        both = np.eye(size + len(self.p))
+        positions, speeds = np.zeros((count, len(both))), np.zeros((count, len(both)))
+
+        def look(part: slice, own: slice) -> None:
+            rows, errors, rates = (
+                w[h[at] :][: count * each] for at, each in
+                ((CONSTRAINED.WORK_ROWS, freedoms), (CONSTRAINED.WORK_ERRORS, 1), (CONSTRAINED.WORK_RATES, 1))
+            )  # fmt: skip
+            rows, u = rows.reshape(count, freedoms, -1), y[freedoms : 2 * freedoms]
+            positions[:, part] = errors[:, own]
+            moved = np.einsum("ijk,j->ik", rows[:, :, own], u[:, 0]) + rows[:, :, 0] @ u[:, own]
+            speeds[:, part] = moved - rates[:, own]
+
+        self.along(t, x, self.u, both[:size], None, both[size:], look=look)
+        of_places = [
+            row
+            for at in s[h[CONSTRAINED.CONSTRAINT_AT] :][: h[CONSTRAINED.CONSTRAINTS]]
+            for row in range(s[at + CONSTRAINT.FIRST_EQUATION], s[at + CONSTRAINT.END_POSITION])
+        ]
+        return positions[of_places], speeds
 
     def linear(self, t: float, x: Array, u: Array, p: Array | None = None) -> tuple[Array, Array, Array]:
         """The rates (x,), and their derivatives by the state (x, x) and by the controls (x, u)."""
@@ -185,6 +264,36 @@ class TangentModel(StatedModel):
         return result
 
 
+class Seen:
+    """What an evaluation has left, as numbers that carry derivatives.
+
+    Args:
+        s: the structure.
+        x: the numbers (k, 1 + DIRECTIONS).
+        w: the work vector (k, 1 + DIRECTIONS).
+    """
+
+    on = staticmethod(carried_by)
+
+    def __init__(self, s: Any, x: Array, w: Array) -> None:
+        self.s, self.x, self.w = s, Rows(x), Rows(w)
+
+    def sure(self, numbers: Sequence[Any]) -> list[Any]:
+        """Numbers as they are: where the evaluation fails, nobody looks."""
+        return [*numbers]
+
+
+class Rows:
+    """A vector of such numbers, which are made of rows where they are asked for."""
+
+    def __init__(self, rows: Array) -> None:
+        self._rows = rows
+
+    def __getitem__(self, place: Any) -> Any:
+        own = self._rows[place]
+        return Rows(own) if isinstance(place, slice) else Carrying(float(own[0]), own[1:].tolist())
+
+
 class Steps:
     """Steps of Merson's method, with derivatives of where they lead by where they begin and by numbers of the model.
 
@@ -200,6 +309,8 @@ class Steps:
     def __init__(self, packed: Packed, forces: Forces, places: Sequence[int]) -> None:
         size, self._places = len(places), places
         method, first = int(packed.structure[MODEL.WORK_SIZE]), int(packed.structure[MODEL.WORK_STATE])
+        # Where constraints bind the motion, no step is good enough to be projected.
+        self._accepted = -1.0 if packed.structure[MODEL.CONSTRAINED] else np.inf
         self._machine = machine = Machine(packed, forces, ("evaluate", MERSON), merson.HEAD + merson.STATES * size)
         self._start, self._end = (np.zeros((2 * size, 1 + DIRECTIONS)) for _ in range(2))
         self._errors, self._h = machine.w[first + ERRORS * size :][:size], machine.w[method:, 0]
@@ -234,7 +345,7 @@ class Steps:
                 self._number, machine.x[:] = number, self._numbers[number]
             machine.begin(t0)
             h = self._h
-            h[REACHED], h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED] = t0, t1, t1 - t0, np.inf
+            h[REACHED], h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED] = t0, t1, t1 - t0, self._accepted
             self._start[:size] = block
             self._end[0] = np.nan
             if self._evaluate(STAGE.ACCELERATION) == OUTCOME.OK:

@@ -8,6 +8,7 @@ from typing import Any
 
 from osimlite.backends import ways
 from osimlite.backends.constraints import dynamics_with
+from osimlite.backends.outputs import probe_places
 from osimlite.backends.symbolic import on_symbols, standing_in, taken
 from osimlite.backends.symbols import Vector, casadi
 from osimlite.errors import UnsupportedError
@@ -17,7 +18,6 @@ from osimlite.kernels.dynamics import evaluate, inverse
 from osimlite.kernels.layout import CONSTRAINED, ITEM, MODEL, RUN, STAGE, WORK
 from osimlite.kernels.pointers import address, call
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.engines.linking import PYTHON, Program
 from osimlite.simulation.pack import Packed
 
@@ -92,8 +92,7 @@ class Traced:
 
     def probed(self) -> Evaluated:
         """All that `evaluate` finds, and after it what the probes do."""
-        owned = self._packed.owners.items()
-        places = [place for place, owner in owned if isinstance(self._elements[owner], DeclaredProbe)]
+        places = probe_places(self._packed, self._elements)
 
         def law(s: Vector, x: Vector, w: Vector, y: Vector, f: Vector) -> None:
             on_symbols(evaluate)(s, x, w, y, f, STAGE.ACCELERATION)
@@ -181,7 +180,7 @@ class Evaluated:
 
     def __init__(self, s: Vector, x: Vector, w: Vector, f: Vector, result: Any, failures: Sequence[Any]) -> None:
         self.s, self.x, self.w, self.f, self.result = s, x, w, f, result
-        self._failed = reduce(casadi.logic_or, failures) if failures else None
+        self.on, self._failed = on_symbols, reduce(casadi.logic_or, failures) if failures else None
 
     def sure(self, numbers: Sequence[Any]) -> Any:
         """Numbers as one column, which are none where the evaluation fails."""

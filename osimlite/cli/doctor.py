@@ -45,7 +45,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "osimlite.gym": ("gymnasium", "numpy"),
     "markers and forces of .c3d files": ("numpy", "ezc3d"),
     "osimlite.mjcf, translate --check": ("mujoco", "numpy"),
-    "osimlite.casadi, outputs of linearize": ("casadi", "numpy"),
+    "osimlite.casadi": ("casadi", "numpy"),
     "models as YAML": ("pyyaml",),
     "trajectory.to_frame()": ("pandas",),
     "trajectory.to_arrow()": ("pyarrow",),

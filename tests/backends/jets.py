@@ -239,4 +239,5 @@ def carried(packed: Any, t: float, y: list[float], controls: list[float], along:
     with _carried([evaluate, *map(law_function, kernels)]):
         evaluate(s, packed.numbers.astype(object), w, state, f, STAGE.ACCELERATION)
     found = [each if isinstance(each, Jet) else Jet(float(each), none, 0.0, none) for each in f]
-    return np.array([e.v for e in found]), np.array([e.g for e in found]), np.array([e.h for e in found])
+    value, slopes, bends = (np.array([getattr(e, part) for e in found]) for part in ("v", "g", "h"))
+    return value, slopes.reshape(one.shape), bends.reshape(one.shape)

@@ -270,5 +270,34 @@ def test_parameters():
 def test_what_is_not_there_is_refused():
     with pytest.raises(SettingError, match="no number '/bodyset/Pelvis/mas'"):
         osimlite.tangents(furthest_walker(), ["/bodyset/Pelvis/mas"])
-    with pytest.raises(SettingError, match="outputs need functions of CasADi"):
-        osimlite.linearize(osimlite.tangents(furthest_walker()), outputs=["mass_center"])
+    with pytest.raises(SettingError, match="no output 'mass_centre'; did you mean 'mass_center'"):
+        osimlite.linearize(furthest_walker(), outputs=["mass_centre"])
+
+
+@pytest.mark.parametrize("name", [furthest_walker, "m0036", "m0115"])
+def test_outputs_have_derivatives(name):
+    """Places, mass centre, contacts, muscles, probes: with those of differences of the outputs themselves."""
+    made = osimlite.tangents(model_named(name))
+    rng, size, moving = np.random.default_rng(2), len(made.states), 2 * len(made.coordinates)
+    x, u = made.x.copy(), rng.uniform(0.1, 0.9, len(made.controls))
+    x[:moving] += 0.02 * rng.normal(size=moving)
+    x[moving:] = np.where(x[moving:] == 0.0, 0.1, x[moving:]) * rng.uniform(0.97, 1.03, size - moving)
+    groups = [group for group, labels in made.output_names.items() if labels]
+    assert {"stations", "mass_center", "contact_forces", "forces", "probes"} & {*groups} == {*groups} - {
+        "station_velocities",
+        "mass_center_velocity",
+    }
+    near = osimlite.linearize(made, x, u, outputs=groups)
+    assert len(near.outputs) == len(near.y) == sum(map(len, made.output_names.values())) and near.C.shape[1] == size
+    chosen = [(group, k) for group in groups for k in range(len(made.output_names[group]))]
+    along = rng.normal(size=size + len(u))
+
+    def moved(h):
+        return made.observed(0.0, x + h * along[:size], u + h * along[size:], chosen)[0]
+
+    both = np.hstack((near.C, near.D))
+    off_by, sizes = np.abs(slope(moved, 1e-5) - both @ along), np.abs(both) @ np.abs(along)
+    for group in groups:
+        rows = [k for k, (own, _) in enumerate(chosen) if own == group]
+        assert off_by[rows].max() < 1e-7 * max(1.0, sizes[rows].max()), group
+    assert near.C.any() and np.array_equal(near.A, made.linear(0.0, x, u)[1])
