@@ -57,7 +57,7 @@ class Gradients:
 
     Raises:
         SettingError: the plan has other steps than Merson's, or something that ends a run before its time.
-        UnsupportedError: constraints bind the motion, or the measure is of events.
+        UnsupportedError: the measure is of events.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -69,11 +69,6 @@ class Gradients:
             raise SettingError("--method gradient is for runs that last their time; leave out --below and --above")
         self._plan, self._variants = plan, Variants(plan)
         given = self._variants.given
-        if given.simulation is not None and given.simulation.constraints:
-            raise UnsupportedError(
-                f"'{given.simulation.constraints[0]}' constrains the motion, which is projected after each step and "
-                "has no derivatives then; take another --method"
-            )
         self._measure = measure(plan.measures[0], given.engine, plan.feet)
         if self._measure.watches:
             raise UnsupportedError(f"'{self._measure.name}' is of events; take another measure, or another --method")

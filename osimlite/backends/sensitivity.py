@@ -18,13 +18,14 @@ import numpy as np
 from osimlite.backends.parameters import number_of
 from osimlite.backends.stated import StatedModel
 from osimlite.backends.tangents import Steps, TangentModel, tangents
-from osimlite.errors import SettingError, SimulationError, UnsupportedError
+from osimlite.errors import SettingError, SimulationError
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.schema.model import Model, expect_model
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.options import PER_RUN
 from osimlite.simulation.run import Simulation
+from osimlite.simulation.start import starting
 from osimlite.simulation.tabular import Tabular
 from osimlite.simulation.trajectory import Trajectory
 from osimlite.sweep.properties import places
@@ -39,6 +40,8 @@ LOOSER = 10.0
 makes them no better, for the motion is not."""
 SAME = 1e-6
 """What rates of the tangents may be off from those of the motion, over the largest of a state or 1."""
+YIELDING, SAME_EQUATION = 1e5, 1e-9
+"""How much more readily coordinates move that do not count; what an equation says beyond others if it counts."""
 SHORTEST = 1e-9
 """Part of a step, s, to which a bend of the equations is narrowed down."""
 
@@ -93,7 +96,8 @@ def sensitivity(
     """The derivatives of all states along a simulated motion by numbers of the model and by states at its start.
 
     The motion is that of :func:`osimlite.simulate` by Merson's steps. Its start is held: what of it follows from
-    parameters, as where muscles are in equilibrium (`equilibrate`), counts as given.
+    parameters, as where muscles are in equilibrium (`equilibrate`), counts as given. Where constraints bind the motion
+    the start goes with them, as little as they need.
 
     Args:
         model: what moves.
@@ -110,7 +114,7 @@ def sensitivity(
     Raises:
         SettingError: there is no such number or state, or an option that does not go with this; the tangents are
             those of another model.
-        UnsupportedError: constraints bind the motion, or a force is computed in Python.
+        UnsupportedError: a force is computed in Python.
         SimulationError: the motion ended, or a derivative of it is no finite number.
 
     Other errors are those of :func:`osimlite.tangents` and :func:`osimlite.simulate`.
@@ -125,11 +129,6 @@ def sensitivity(
     accuracy = choices["accuracy"] = choices.get("accuracy") or ACCURACY
     folder = Path(choices.get("folder") or ".")
     with Simulation(model, "compiled", folder=folder) as simulation:
-        if simulation.constraints:
-            raise UnsupportedError(
-                f"'{simulation.constraints[0]}' constrains the motion, which is projected after each step; take it out "
-                "of the model, lock coordinates, or take `residual` and `constraints` of osimlite.casadi"
-            )
         if isinstance(parameters, TangentModel):
             made = parameters
         else:
@@ -139,7 +138,8 @@ def sensitivity(
             _require_held(model, made, name)
         made.take(np.array([number_of(model, name) for name in made.parameters]))
         trajectory = simulation.run(to, **{name: choices[name] for name in choices if name != "folder"})
-        motion = _Followed(made, simulation, initial)
+        _, _, held = starting(simulation.mechanism, _moving(simulation, choices), choices.get("initial_speeds") or {})
+        motion = _Followed(made, simulation, initial, held)
         rows = motion.rows(trajectory, accuracy)
     names = *made.parameters, *(made.states[k] for k in initial)
     return Sensitivity(trajectory, trajectory.times, made.states, names, motion.states(trajectory), rows)
@@ -152,10 +152,13 @@ class _Followed:
         made: tangents of the model, with the parameters that it has.
         simulation: of it, with the controls of the motion.
         initial: places of the states of which the start counts.
+        held: places in the mechanism of the coordinates whose values, and of those whose speeds, were given.
     """
 
-    def __init__(self, made: TangentModel, simulation: Simulation, initial: Sequence[int]) -> None:
-        self._made, self._simulation, self._initial = made, simulation, initial
+    def __init__(
+        self, made: TangentModel, simulation: Simulation, initial: Sequence[int], held: Sequence[Sequence[int]]
+    ) -> None:
+        self._made, self._simulation, self._initial, self._held = made, simulation, initial, held
         engine: Any = simulation.engine
         self._engine = engine
         infos, order = simulation.mechanism.coordinates, self._engine.order
@@ -189,7 +192,28 @@ class _Followed:
         slopes = np.zeros((len(self._places), count + len(initial)))
         slopes[initial, range(count, count + len(initial))] = 1.0
         rows = np.array(states)[:, self._places]
+        if self._simulation.constraints:
+            self._bind(rows[0], slopes)
         return followed(self._steps, times, rows, slopes, wanted, accuracy, self._made.states)
+
+    def _bind(self, x: Array, slopes: Array) -> None:
+        """Have the start (x,) go with the constraints along all directions, by derivatives (x, m) of it.
+
+        As it was found: of what is not held, values that do not count give way, then all as little as can be, and
+        speeds relative to themselves where they are above 1.
+        """
+        made, size = self._made, len(self._made.coordinates)
+        infos = {info.path: info for info in made.mechanism.coordinates}
+        eases = np.ones(size), np.maximum(np.abs(x[size : 2 * size]), 1.0)
+        eases[0][[infos[path].yielding for path in made.coordinates]] = YIELDING
+        by_numbers = np.eye(len(made.parameters), slopes.shape[1])
+        for part, (held, ease, equations) in enumerate(zip(self._held, eases, made.bound(0.0, x), strict=True)):
+            places = slice(part * size, (part + 1) * size)
+            paths = [made.mechanism.coordinates[place].path for place in held]
+            scales = np.where(np.isin(made.coordinates, paths), 0.0, ease)
+            missing = equations @ np.vstack((slopes, by_numbers))
+            change = np.linalg.lstsq(equations[:, places] * scales, missing, rcond=SAME_EQUATION)[0]
+            slopes[places] -= scales[:, None] * change
 
     def _require_same(self, t: float, y: Sequence[float]) -> None:
         """SettingError where the tangents say another derivative of the state than the motion has."""
@@ -269,6 +293,12 @@ def _require_held(model: Model, made: TangentModel, name: str) -> None:
         state = f"{place.component}/{what.removeprefix('default_').removesuffix('_value')}"
         if what.startswith("default_") and state in made.states:
             raise SettingError(f"'{name}' is where a state starts, which is held; take '{state}' among the states")
+
+
+def _moving(simulation: Simulation, choices: Mapping[str, Any]) -> dict[str, float]:
+    """What was given of the values of coordinates at the start, and not of auxiliary states."""
+    auxiliary = simulation.state.paths
+    return {name: value for name, value in (choices.get("initial") or {}).items() if name not in auxiliary}
 
 
 def _place(what: str, names: Sequence[str], name: str) -> int:

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.errors import SettingError, SimulationError, UnsupportedError
+from osimlite.errors import SettingError, SimulationError
 from osimlite.models.jumper import jumper
 from osimlite.models.walkers import furthest_walker
 from osimlite.sweep.properties import places
+from tests.simulation.test_constrained import MODELS
 
 ACCURACY = 1e-11
 ANGLE, SPEED = "/jointset/hinge/angle/value", "/jointset/hinge/angle/speed"
@@ -142,17 +143,37 @@ def test_what_is_not_there_is_refused():
         osimlite.sensitivity(pendulum(), fixed_step=0.001)
     with pytest.raises(SettingError, match=f"is where a state starts, which is held; take '{ANGLE}'"):
         osimlite.sensitivity(pendulum(), ["/jointset/hinge/angle/default_value"])
-    model = pendulum()
-    other = model.add(osimlite.Body(name="other", mass=1.0, inertia=(1, 1, 1, 0, 0, 0)))
-    model.add(
-        osimlite.PinJoint(name="axle", coordinates=[osimlite.Coordinate(name="turn")]).between(model.ground, other)
-    )
-    model.add(osimlite.CoordinateCouplerConstraint(
-        name="gear", independent_coordinate_names=("angle",), dependent_coordinate_name="turn",
-        coupled_coordinates_function=osimlite.LinearFunction(coefficients=(1.0, 0.0)),
-    ))  # fmt: skip
-    with pytest.raises(UnsupportedError, match=r"gear' constrains the motion, .* lock coordinates"):
-        osimlite.sensitivity(model, to=0.1)
+
+
+@pytest.mark.parametrize("name", ["four_bars", "patella", "rod", "welded", "half_locked"])
+def test_constraints_go_with_a_motion(name):
+    """From a state where they hold; a state that is changed is the nearest one then."""
+    model, to = MODELS[name](), 0.2
+    first = osimlite.sensitivity(model, to=0.01)
+    start = dict(zip(first.states, first.motion[0].tolist(), strict=True))
+    by = [first.states[0], first.states[len(first.states) // 2]]
+    choices = {"initial": start, "report_interval": to}
+    mass = f"/bodyset/{model.body_set.objects[0].name}/mass"
+    found = osimlite.sensitivity(model, [mass], to, states=by, accuracy=1e-10, **choices)
+    for number in found.numbers:
+        wanted = difference(model, found, number, 1e-3, to, **choices)
+        own = found.derivatives[:, :, found.numbers.index(number)]
+        assert np.abs(own - wanted).max() < 1e-7 * max(1.0, np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_start_that_is_bound_goes_with_a_number(held):
+    """How long a rod is tells where the motion starts, but for what was given."""
+    model, number, angle = MODELS["rod"](), "/constraintset/rod/constant_distance", "/jointset/j0/p0/value"
+    first = osimlite.sensitivity(model, to=0.01)
+    start = dict(zip(first.states, first.motion[0].tolist(), strict=True))
+    if held:
+        start["p0"] = start.pop(angle)
+    choices = {"initial": start, "report_interval": 0.1}
+    found = osimlite.sensitivity(model, [number], 0.1, accuracy=1e-10, **choices)
+    wanted = difference(model, found, number, 1e-4, 0.1, **choices)
+    assert np.abs(found.derivatives[:, :, 0] - wanted).max() < 1e-7 * np.abs(wanted).max()
+    assert (found.of(angle, number)[0] == 0.0) == held
 
 
 def test_derivatives_that_are_no_numbers_are_told(monkeypatch):
