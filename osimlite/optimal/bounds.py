@@ -104,7 +104,7 @@ def state_bounds(
         elif what == "activation" and isinstance(owner, ActivationCoordinateActuator):
             otherwise = owner.min_control, owner.max_control
         elif what == "activation" and isinstance(owner, Muscle) and phase.bound_activation_from_excitation:
-            otherwise = controls[path].within
+            otherwise = controls[path].within if path in controls else (owner.min_control, owner.max_control)
         result[name] = infos.bounds(name, otherwise)
     return result
 

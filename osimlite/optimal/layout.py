@@ -41,7 +41,7 @@ class Layout:
         accelerations = [f"{path}/accel" for path in functions.coordinates] if problem.dynamics.is_implicit else []
         self.names: dict[str, list[str]] = {
             "states": [*functions.states],
-            "controls": [*functions.controls],
+            "controls": [*problem.controls],
             "multipliers": multipliers,
             "derivatives": [*accelerations, *problem.dynamics.tendons.names],
             "slacks": problem.slack_names,

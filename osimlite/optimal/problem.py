@@ -55,7 +55,7 @@ class Problem(Asked):
         model: that moves.
         functions: of the model (:class:`~osimlite.backends.functions.CasadiModel`).
         states: bounds by paths of states, in the order of `functions.states`.
-        controls: likewise of controls.
+        controls: likewise of the controls of actuators that act; the others are zero.
         times: ranges of the initial and the final time, s.
         parameters: ranges by names of parameters.
         constraint_names: of the equations that the model's constraints make, as OpenSim numbers them.
@@ -102,8 +102,10 @@ class Problem(Asked):
         }
         self.parameter_owners = [place for place, own in enumerate(paths.values()) for _ in own]
         self._add_factors()
-        self._expect_infos()
-        self.controls = control_bounds(self.phase, self.functions.controls, self.components)
+        # OpenSim has no controls of actuators that do not act.
+        acting = [name for name in self.functions.controls if self._acts(name)]
+        self._expect_infos(acting)
+        self.controls = control_bounds(self.phase, acting, self.components)
         self.states = state_bounds(self.phase, self.functions.states, self.components, self.controls)
         self.times: tuple[Range, Range] = (
             range_of(self.phase.time_initial_bounds) or FREE,
@@ -242,12 +244,16 @@ class Problem(Asked):
             goal = MocoControlGoal(name="state_projection", weight=solver.state_projection_distance_weight)
             yield goal, replace(integral(_way), is_sum=True)
 
-    def _expect_infos(self) -> None:
+    def _acts(self, control: str) -> bool:
+        owner: Any = self.components.get(control) or self.components[control.rpartition("_")[0]]
+        return bool(owner.appliesForce)
+
+    def _expect_infos(self, controls: Sequence[str]) -> None:
         for pattern in (*self.phase.state_infos_pattern, *self.phase.control_infos_pattern):
             self.pattern(pattern, pattern.name)
         for infos, known, what in (
             (self.phase.state_infos, self.functions.states, "state"),
-            (self.phase.control_infos, self.functions.controls, "control"),
+            (self.phase.control_infos, controls, "control"),
         ):
             for info in infos:
                 self.expect(info, info.name, known, what)

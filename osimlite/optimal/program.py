@@ -178,11 +178,13 @@ class Program:
             parts[kind] = z[first : first + count]
             first += count
         parameters = [s[2 + owner] for owner in self.problem.parameter_owners]
+        u = SX(len(self.problem.functions.controls), 1)
+        u[[*map(self.problem.functions.controls.index, self.problem.controls)]] = parts["controls"]
         return Point(
             problem=self.problem,
             t=s[0] + place * (s[1] - s[0]),
             x=parts["states"],
-            u=parts["controls"],
+            u=u,
             multipliers=parts["multipliers"],
             derivatives=parts["derivatives"],
             slacks=parts["slacks"],

@@ -496,6 +496,10 @@ import osimlite
 from osimlite import moco
 from osimlite.optimal.ipopt import violations
 from osimlite.optimal.program import Program
+# One that does not act has states and no control; MocoControlGoal takes wrong ones for those behind it.
+model = osimlite.read("model.osim")
+[*model.components(osimlite.Actuator)][-1].appliesForce = sys.argv[1] == "implicit"
+osimlite.write(model, "model.osim")
 phase = osimlite.MocoPhase(name="phases", model=osimlite.ModelProcessor(name="model", filepath="model.osim"))
 if sys.argv[1] == "implicit":
     phase.model.operators += [osimlite.ModOpRemoveMuscles(), osimlite.ModOpAddReserves(optimal_force=7.0)]
@@ -505,6 +509,7 @@ for name, bounds in ((".*/value", (-0.3, 0.4)), (".*/speed", (-2.0, 3.0))):
     phase.state_infos_pattern.append(osimlite.MocoVariableInfo(name=name, bounds=bounds))
 phase.control_infos_pattern.append(osimlite.MocoVariableInfo(name=".*", bounds=(0.1, 0.7)))
 phase.goals.append(osimlite.MocoSumSquaredStateGoal(name="some", pattern=".*_r/.*"))
+phase.goals.append(osimlite.MocoControlGoal(name="effort"))
 solver = osimlite.MocoCasADiSolver(multibody_dynamics_mode=sys.argv[1], num_mesh_intervals=2, optim_max_iterations=0)
 study = osimlite.MocoStudy(problem=osimlite.MocoProblem(name="problem", phases=phase), solver=solver)
 osimlite.write(study, "study.omoco")

@@ -12,5 +12,5 @@ def rows(constraint: MocoControlBoundConstraint, problem: Problem) -> Rows:
     """How far each control is above the functions."""
     paths = [str(path) for path in constraint.control_paths]
     for path in paths:
-        problem.expect(constraint, path, problem.functions.controls, "control")
+        problem.expect(constraint, path, problem.controls, "control")
     return rows_between(constraint, problem, paths, Point.control)

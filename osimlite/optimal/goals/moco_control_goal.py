@@ -10,12 +10,13 @@ from osimlite.schema.moco.goals import MocoControlGoal
 
 def terms(goal: MocoControlGoal, problem: Problem) -> Terms:
     """The integral of the weighted sum of powers of the controls' sizes."""
-    controls = problem.functions.controls
+    controls = [*problem.controls]
     weights = problem.weights(goal, goal.control_weights, goal.control_weights_pattern, controls, "control")
     power = goal.exponent
 
     def integrand(point: Point) -> Formula:
-        sizes = point.u if power % 2 == 0 else casadi.fabs(point.u)
+        own = casadi.vertcat(*map(point.control, controls))
+        sizes = own if power % 2 == 0 else casadi.fabs(own)
         return casadi.dot(casadi.DM(weights), sizes**power)
 
     return integral(integrand)

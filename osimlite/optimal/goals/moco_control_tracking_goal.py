@@ -10,7 +10,7 @@ from osimlite.schema.moco.tracking import MocoControlTrackingGoal
 
 def terms(goal: MocoControlTrackingGoal, problem: Problem) -> Terms:
     """The integral of the weighted sum of squares of the controls' distances from splines through the table."""
-    controls, table = problem.functions.controls, table_of(problem, goal, goal.reference)
+    controls, table = [*problem.controls], table_of(problem, goal, goal.reference)
     columns = {item.name: item.reference for item in goal.reference_labels}
     if not columns:
         columns = {name: name for name in table.columns if name in controls or not goal.allow_unused_references}

@@ -13,7 +13,7 @@ def terms(goal: MocoPeriodicityGoal, problem: Problem) -> Terms:
     functions, pairs = problem.functions, []
     for given, known, what in (
         (goal.state_pairs, functions.states, "state"),
-        (goal.control_pairs, functions.controls, "control"),
+        (goal.control_pairs, problem.controls, "control"),
     ):
         for pair in given:
             first, last = pair.initial_variable, pair.final_variable or pair.initial_variable
