@@ -19,7 +19,7 @@ Vary = Annotated[
         metavar="NAME=RANGE",
         help="LOW:HIGH (in a sweep also LOW:HIGH:COUNT; with :log at the end, spread by the logarithm) of a "
         "coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY (@scale: a factor of it), or parameter of "
-        "the model function or of the controller (all of these where nothing is said). MUSCLE/control@0:0.5:6 are six "
+        "the model function or of the controller (all of these if nothing else varies). MUSCLE/control@0:0.5:6 are six "
         "nodes of a control over time, @switch1 is a time at which it is switched. Names may have * and ?, and be "
         "several with commas: they vary as one; what is in {} makes a variable for each text that it stands for.",
         show_default=False,

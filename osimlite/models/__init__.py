@@ -8,6 +8,7 @@ BUILT_IN = {
     "steady-walker": "osimlite.models.walkers:steady_walker",
     "human-walker": "osimlite.models.walkers:human_walker",
     "human": "osimlite.models.walking:human",
+    "arm": "osimlite.models.arm:arm",
     "jumper": "osimlite.models.jumper:jumper",
     "human-walks": "osimlite.models.predicted_walk:human_walks",
 }

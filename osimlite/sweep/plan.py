@@ -25,7 +25,7 @@ from osimlite.simulation.run import Simulation
 from osimlite.simulation.start import in_units_of, suspect_value
 from osimlite.sweep.controls import Control, check_nodes, controller_of
 from osimlite.sweep.measures import is_expression, measure_name
-from osimlite.sweep.variables import Parameter, Range, Variable, variables
+from osimlite.sweep.variables import Gains, Parameter, Range, Variable, variables
 from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:
@@ -170,8 +170,8 @@ def plan(
 
     Args:
         source: the model, or what makes it from the parameters that it is given.
-        vary: ranges by name, see :mod:`osimlite.sweep.variables`; if there are none, all parameters of a controller are
-            varied between their bounds.
+        vary: ranges by name, see :mod:`osimlite.sweep.variables`; if nothing differs by them, all other parameters of a
+            controller do, between their bounds.
         parameters: that `source` takes, with their defaults.
         below: levels that end a run when a coordinate falls below them: rad, m, or a text such as "30deg".
         above: levels that end a run when a coordinate rises above them, likewise.
@@ -191,10 +191,13 @@ def plan(
     if (controller := choices.get("controller")) is not None:
         own = {name: choices[name] for name in ("skip_unsupported", "wrapping", "folder") if choices.get(name)}
         gains = controller.gains(model, Simulation(model, **own).engine)
-        vary = vary or {gain.name: _bounds(gain) for gain in gains}
-        if not vary:
+        if not (vary or gains):
             raise SettingError("say what to vary; the controller has no parameters, which are written as ~2<0,20>")
     result = variables(vary, model, mechanism, parameters, gains)
+    if all(item.is_fixed for item in result):
+        held = {name for item in result if isinstance(item.target, Gains) for name in item.target.parts}
+        rest = {gain.name: _bounds(gain) for gain in gains if gain.name not in held}
+        result = variables({**vary, **rest}, model, mechanism, parameters, gains)
     for item in result:
         tell_doubt(item.doubt)
     needs_maker = any(isinstance(item.target, Parameter) for item in result)

@@ -10,7 +10,7 @@ import pytest
 
 import osimlite
 from osimlite import Body, Model
-from osimlite.gym.tasks import arm
+from osimlite.models.arm import arm
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
@@ -94,7 +94,7 @@ def test_bodies_are_felt_as_they_are(tmp_path) -> None:
 
 def test_muscles_are_felt_as_they_are(tmp_path) -> None:
     gains = {f"K{letter}": 0.1 for letter in "LVFSA"}
-    told, model, states = followed(arm().model(), {"MuscleReflex": {"target": "flexor", **gains}}, tmp_path)
+    told, model, states = followed(arm(), {"MuscleReflex": {"target": "flexor", **gains}}, tmp_path)
     muscle = model.getMuscles().get("flexor")
     for row, state in states:
         model.realizeDynamics(state)

@@ -403,6 +403,8 @@ def test_gains_of_many_runs_are_those_of_single_ones_bit_for_bit(model) -> None:
     assert {item.name: (item.low, item.high) for item in made.variables} == {
         "motor-elbow.delay": (0.0, 0.05), "motor-elbow.KP": (0.0, 9.0), "motor-elbow.KV": (0.0, 1.0),
     }  # fmt: skip
+    some = plan(model, {"elbow": "0.7", "motor-elbow.KP": "2"}, **choices)
+    assert [item.name for item in some.variables] == ["elbow", "motor-elbow.KP", "motor-elbow.delay", "motor-elbow.KV"]
     rows = np.array([[0.0, 5.0, 0.1], [0.05, 0.0, 0.0], [0.013, 2.0, 0.9]])
     together = Runner(made).run(rows)
     names = [item.name for item in made.variables]

@@ -10,7 +10,7 @@ pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.gym.tasks import arm as task
+from osimlite.models.arm import arm
 from osimlite.models.walking import write_scenario
 from osimlite.simulation.held import Held
 
@@ -44,12 +44,12 @@ def test_what_has_no_meaning_is_refused(kind, changed, words) -> None:
     given = {**(POINT if kind == "BodyPointReflex" else TURN if "Body" in kind else {"target": "flexor"}), **changed}
     reflex = {key: value for key, value in given.items() if value is not None}
     with pytest.raises(OsimliteError, match=words):
-        held(task().model(), {"dual_sided": 0, "DofReflex": {"target": "flexor", "source": "elbow"}, kind: reflex})
+        held(arm(), {"dual_sided": 0, "DofReflex": {"target": "flexor", "source": "elbow"}, kind: reflex})
 
 
 def test_a_gain_that_is_looked_for_is_felt_even_where_it_is_none() -> None:
     """So that candidates differ in numbers only."""
-    model, given = task().model(), {"dual_sided": 0, "BodyOrientationReflex": TURN}
+    model, given = arm(), {"dual_sided": 0, "BodyOrientationReflex": TURN}
     one, none = held(model, given), held(model, given, {"flexor-forearm.KP": 0.0})
     assert one.plan.tolist() == none.plan.tolist() and one.sensors == none.sensors == (
         "forearm.angle(0,0,1)", "forearm.turn(0,0,1)",
@@ -75,7 +75,7 @@ def test_kernels_as_python_feel_likewise(monkeypatch) -> None:
         "BodyPointReflex": {**POINT, "KP": 0.1, "KV": 0.1},
         "BodyOrientationReflex": TURN,
     }
-    model, controller = task().model(), osimlite.Feedback({"ReflexController": given})
+    model, controller = arm(), osimlite.Feedback({"ReflexController": given})
     expected = osimlite.simulation.Simulation(model, "compiled").run(0.02, controller=controller)
     with monkeypatch.context() as patched:
         patched.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
