@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from osimlite.kernels.layout import INERTIA_AT, LINK, LINK_WORK, MODEL
+from osimlite.kernels.layout import INERTIA, INERTIA_AT, LINK, LINK_WORK, MODEL
 from osimlite.kernels.parts import link_ints
 from osimlite.kernels.paths import LENGTH, SPEED
 from osimlite.kernels.points import angular_velocity, direction, station, velocity
@@ -123,8 +123,8 @@ def _mass_center(mechanism: Mechanism, packed: Packed, found: Found) -> tuple[li
     """Where the mass centre of all bodies is, and how it moves."""
     parts = []
     for link in range(int(packed.structure[MODEL.LINKS])):
-        first = INERTIA_AT + 10 * link
-        parts.append((found.x[first], link, tuple(found.x[first + 1 : first + 4])))
+        first = INERTIA_AT + INERTIA.SIZE * link
+        parts.append((found.x[first], link, tuple(found.x[first + INERTIA.CENTER : first + INERTIA.MOMENTS])))
     for placement, body in zip(packed.placements, mechanism.bodies, strict=True):
         if placement.link == GROUND:
             own, frame = body.mass_properties, placement.frame

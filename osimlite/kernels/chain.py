@@ -13,6 +13,7 @@ from osimlite.kernels.ball_joint import angle_drift, angle_row, last_axis
 from osimlite.kernels.layout import (
     CHAIN,
     DOF,
+    EXCESS,
     JOINT,
     JOINT_KIND,
     LINK_WORK,
@@ -20,6 +21,8 @@ from osimlite.kernels.layout import (
     OPERATION,
     OPERATION_WORK,
     OUTCOME,
+    PRODUCT,
+    SHARE,
 )
 from osimlite.kernels.parts import link_work, operation_ints, operation_work
 from osimlite.kernels.pointers import Floats, Ints, at, call
@@ -35,22 +38,25 @@ def chain_dynamics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: 
     forces, shares = at(w, h[CHAIN.WORK_JOINTS] + 3 * h[CHAIN.JOINTS]), at(w, h[CHAIN.WORK_SHARES])
     matrix = at(forces, h[CHAIN.JOINTS])
     for k in range(h[CHAIN.SHARES]):
-        joint, freedom = s[h[CHAIN.SHARE_AT] + 2 * k], s[h[CHAIN.SHARE_AT] + 2 * k + 1]
+        share = at(s, h[CHAIN.SHARE_AT] + SHARE.SIZE * k)
+        joint, freedom = share[SHARE.JOINT], share[SHARE.DOF]
         if freedom >= 0:
             right[freedom] -= shares[k] * forces[joint]
     for k in range(h[CHAIN.ENTRY_AT], h[CHAIN.END_ENTRY]):
         w[k] = 0.0
     for k in range(h[CHAIN.PRODUCTS]):
-        product = at(s, h[CHAIN.PRODUCT_AT] + 4 * k)
-        w[product[3]] += shares[product[0]] * shares[product[1]] * matrix[product[2]]
+        product = at(s, h[CHAIN.PRODUCT_AT] + PRODUCT.SIZE * k)
+        w[product[PRODUCT.PLACE]] += (
+            shares[product[PRODUCT.ONE]] * shares[product[PRODUCT.TWO]] * matrix[product[PRODUCT.ENTRY]]
+        )
     for k in range(h[CHAIN.EXCESSES]):
-        excess = at(s, h[CHAIN.EXCESS_AT] + 3 * k)
+        excess = at(s, h[CHAIN.EXCESS_AT] + EXCESS.SIZE * k)
         take_off(
             s,
             w,
-            x[excess[2]],
-            excess[1],
-            at(link_work(s, w, excess[0]), LINK_WORK.ACCELERATION),
+            x[excess[EXCESS.NUMBER]],
+            excess[EXCESS.DOF],
+            at(link_work(s, w, excess[EXCESS.LINK]), LINK_WORK.ACCELERATION),
             right,
         )
     return OUTCOME.OK

@@ -26,6 +26,7 @@ from osimlite.kernels.layout import (
     CONTACT_WORK,
     DOF,
     GRAVITY_AT,
+    INERTIA,
     INERTIA_AT,
     ITEM,
     LINK,
@@ -35,7 +36,7 @@ from osimlite.kernels.layout import (
     OPERATION,
     OPERATION_WORK,
     OUTCOME,
-    RESPONSE_INTS,
+    RESPONSE,
     STAGE,
     WORK,
 )
@@ -65,8 +66,6 @@ CENTER = 7
 SLIGHT = 1e-12
 """What counts as rounding among generalized forces of 1 N."""
 
-KERNEL, OF_ITEM, FIRST_STATE, STATES, SENSE = 0, 1, 2, 3, 4
-"""Integers of a response: its kernel, its item, its first state and their count, and the sense in which it pulls."""
 
 HEAVY = 1e6
 """Weight of constraints: what a unit of an equation weighs, in terms of the largest mass."""
@@ -98,14 +97,14 @@ def linearise(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, room: Floats,
         stiffness[k] = damping[k] = 0.0
     turn_levers(s, x, w, stiffness)
     for number in range(s[MODEL.RESPONSES]):
-        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
+        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(s, room, number)
         clear_wrenches(s, w)
         for k in range(size):
             f[k] = right[k] = 0.0
-        status = call(response[KERNEL], s, x, w, y, f, response[OF_ITEM])
+        status = call(response[RESPONSE.KERNEL], s, x, w, y, f, response[RESPONSE.ITEM])
         if status != OUTCOME.OK:
             return status
-        changes = response[STATES] > 0
+        changes = response[RESPONSE.STATES] > 0
         for k in range(INVERSE):
             known[size + k] = w[WORK.SCRATCH + k]
             changes = changes or w[WORK.SCRATCH + k] != 0.0
@@ -118,7 +117,7 @@ def linearise(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, room: Floats,
                 first, end = min(first, k), k + 1
         known[size + FIRST], known[size + END] = first, end
         if changes:
-            sense, by_displacement, by_speed = response[SENSE], known[size], known[size + 1]
+            sense, by_displacement, by_speed = response[RESPONSE.SENSE], known[size], known[size + 1]
             add_product(size, 1.0, known, first, end, f, 0, size, stiffness)
             add_product(size, sense * by_displacement, known, first, end, known, first, end, stiffness)
             add_product(size, sense * by_speed, known, first, end, known, first, end, damping)
@@ -161,10 +160,11 @@ def turn_levers(s: Ints, x: Floats, w: Floats, levers: Floats) -> None:
     """
     size = s[MODEL.DOFS]
     for link in range(s[MODEL.LINKS]):
-        b, load = at(x, INERTIA_AT + 10 * link), at(link_work(s, w, link), LINK_WORK.INERTIA)
+        b, load = at(x, INERTIA_AT + INERTIA.SIZE * link), at(link_work(s, w, link), LINK_WORK.INERTIA)
         for k in range(LOAD):
             load[k] = 0.0
-        add_load(s, w, link, station(s, w, link, vector(b, 1)), times(b[0], vector(x, GRAVITY_AT)), ZERO)
+        weight = times(b[INERTIA.MASS], vector(x, GRAVITY_AT))
+        add_load(s, w, link, station(s, w, link, vector(b, INERTIA.CENTER)), weight, ZERO)
     for pair in range(s[MODEL.CONTACTS]):
         i = at(s, s[s[MODEL.CONTACT_AT] + pair])
         contact = at(w, s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
@@ -231,8 +231,9 @@ def condense(s: Ints, c: float, room: Floats) -> bool:
         system[k] = room[k] - c * (damping[k] + c * stiffness[k])
         levers[k] = stiffness[k]
     for number in range(s[MODEL.RESPONSES]):
-        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
-        count, places, a = response[STATES], at(s, response[OF_ITEM] + response[FIRST_STATE]), at(known, size)
+        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(s, room, number)
+        count, a = response[RESPONSE.STATES], at(known, size)
+        places = at(s, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
         if count == 0:
             continue
         inverse, gains, pulls, driven = at(a, INVERSE), at(a, GAINS), at(a, PULLS), at(a, RIGHT)
@@ -255,7 +256,7 @@ def condense(s: Ints, c: float, room: Floats) -> bool:
             if places[i] >= 0:
                 by_speed += a[2 + i] * gains[i]
                 by_displacement += c * pulls[i] * a[WIDTH * (1 + i)]
-        first, end, sense = int(a[FIRST]), int(a[END]), response[SENSE]
+        first, end, sense = int(a[FIRST]), int(a[END]), response[RESPONSE.SENSE]
         add_product(size, -c * sense * by_speed, known, first, end, known, first, end, system)
         add_product(size, sense * by_displacement, known, first, end, known, first, end, levers)
     return eliminate(size, system, room)
@@ -312,9 +313,9 @@ def correct(s: Ints, c: float, room: Floats, d: Floats) -> None:
         for k in range(size):
             right[i] += room[size * i + k] * du[k] + c * levers[size * i + k] * d[k]
     for number in range(s[MODEL.RESPONSES]):
-        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
-        places, a, force = at(s, response[OF_ITEM] + response[FIRST_STATE]), at(known, size), 0.0
-        for k in range(response[STATES]):
+        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(s, room, number)
+        places, a, force = at(s, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE]), at(known, size), 0.0
+        for k in range(response[RESPONSE.STATES]):
             if places[k] >= 0:
                 force += c * a[PULLS + k] * d[places[k]]
         if force != 0.0:
@@ -322,13 +323,14 @@ def correct(s: Ints, c: float, room: Floats, d: Floats) -> None:
                 right[k] += force * known[k]
     substitute(size, system, right)
     for number in range(s[MODEL.RESPONSES]):
-        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE_INTS * number), known_of(s, room, number)
-        count, places, a = response[STATES], at(s, response[OF_ITEM] + response[FIRST_STATE]), at(known, size)
+        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(s, room, number)
+        count, a = response[RESPONSE.STATES], at(known, size)
+        places = at(s, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
         if count == 0:
             continue
         first, end = int(a[FIRST]), int(a[END])
-        displacement = response[SENSE] * product(first, end, known, d)
-        speed = response[SENSE] * product(first, end, known, right)
+        displacement = response[RESPONSE.SENSE] * product(first, end, known, d)
+        speed = response[RESPONSE.SENSE] * product(first, end, known, right)
         for i in range(count):
             a[RIGHT + i] = d[places[i]] + c * a[WIDTH * (1 + i)] * displacement if places[i] >= 0 else 0.0
         for i in range(count):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from osimlite.forces.vectors import ZERO, Vector, cross, dot, minus, norm, over, plus, times, vector
 from osimlite.kernels.ball_joint import angle_drift, angle_row
 from osimlite.kernels.functions import MONOMIALS, several_at, value_at
-from osimlite.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, ITEM, LINK, LINK_WORK, MODEL, OUTCOME, WORK
+from osimlite.kernels.layout import CONSTRAINED, CONSTRAINT, COORDINATE, DOF, LINK, LINK_WORK, MODEL, OUTCOME, WORK
 from osimlite.kernels.parts import link_ints, link_work
 from osimlite.kernels.pointers import Floats, Ints, at
 from osimlite.kernels.points import (
@@ -31,15 +31,13 @@ the end of the second is a roller whose point at its start moves along with that
 VECTOR_INTS, EQUATION_INTS, EQUATION_NUMBERS = 3, 7, 13
 """Of a vector its kind and two links (an axis has the first); of an equation its kind and two vectors; and for each
 vector six numbers, of an axis or two points in their links, and the wanted value."""
-COORDINATE_INTS = 3
-"""Of a coordinate: its degree of freedom, the place of the arguments of its ball or -1, and its number among these."""
 
 
 def prescribe(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int) -> int:
     """A coordinate follows a function of time, whose table is all its numbers."""
     i, h = at(s, constraint), at(s, s[MODEL.CONSTRAINED])
     row, own = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
-    value, slope, curvature = value_at(at(x, i[ITEM.NUMBERS]), w[WORK.TIME])
+    value, slope, curvature = value_at(at(x, i[CONSTRAINT.NUMBERS]), w[WORK.TIME])
     w[h[CONSTRAINED.WORK_ERRORS] + row] = y[own[0]] - value
     w[h[CONSTRAINED.WORK_RATES] + row] = slope
     bias = add_coordinate(s, y, f, own, 1.0, at(w, h[CONSTRAINED.WORK_ROWS] + s[MODEL.DOFS] * row))
@@ -54,10 +52,10 @@ def couple(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int)
     degrees of freedom, and each coordinate again in full; its numbers the values of coordinates at rest, the dependent
     one first, and the table of the function.
     """
-    i, h, p = at(s, constraint), at(s, s[MODEL.CONSTRAINED]), at(x, s[constraint + ITEM.NUMBERS])
+    i, h, p = at(s, constraint), at(s, s[MODEL.CONSTRAINED]), at(x, s[constraint + CONSTRAINT.NUMBERS])
     row, own = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
-    size, freedoms = own[COORDINATE_INTS + 1], at(own, COORDINATE_INTS + 2)
-    others, gradient, constants = at(freedoms, size), at(w, own[COORDINATE_INTS]), at(p, 1)
+    size, freedoms = own[COORDINATE.SIZE + 1], at(own, COORDINATE.SIZE + 2)
+    others, gradient, constants = at(freedoms, size), at(w, own[COORDINATE.SIZE]), at(p, 1)
     if int(constants[size]) >= MONOMIALS:
         value, _, curvature = several_at(size, freedoms, constants, y, f, gradient)
     else:
@@ -71,7 +69,7 @@ def couple(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int)
     to = at(w, h[CONSTRAINED.WORK_ROWS] + s[MODEL.DOFS] * row)
     bias = add_coordinate(s, y, f, own, -1.0, to)
     for k in range(size):
-        bias += add_coordinate(s, y, f, at(others, COORDINATE_INTS * k), gradient[k], to)
+        bias += add_coordinate(s, y, f, at(others, COORDINATE.SIZE * k), gradient[k], to)
     w[h[CONSTRAINED.WORK_ERRORS] + row] = value - (y[own[0]] if own[0] >= 0 else p[0])
     w[h[CONSTRAINED.WORK_DRIFTS] + row] = -bias - curvature
     return OUTCOME.OK
@@ -79,14 +77,14 @@ def couple(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint: int)
 
 def add_coordinate(s: Ints, y: Floats, f: Floats, coordinate: Ints, factor: float, row: Floats) -> float:
     """Add a multiple of the rate of a coordinate to a row; returns that of what it changes by while no speed does."""
-    freedom, ball = coordinate[0], coordinate[1]
+    freedom, ball = coordinate[COORDINATE.DOF], coordinate[COORDINATE.BALL]
     if freedom < 0:
         return 0.0
     if ball < 0:
         row[freedom] += factor
         return 0.0
     angles = at(s, ball)
-    n = angle_row(y, angles, coordinate[2])
+    n = angle_row(y, angles, coordinate[COORDINATE.PART])
     one, two, three = n
     row[angles[0]] += factor * one
     row[angles[1]] += factor * two
@@ -101,7 +99,7 @@ def bind_bodies(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, constraint:
     for row in range(first, i[CONSTRAINT.END_EQUATION]):
         own, p = (
             at(i, CONSTRAINT.OWN + EQUATION_INTS * (row - first)),
-            at(x, i[ITEM.NUMBERS] + EQUATION_NUMBERS * (row - first)),
+            at(x, i[CONSTRAINT.NUMBERS] + EQUATION_NUMBERS * (row - first)),
         )
         one, two, wanted = at(own, 1), at(own, 1 + VECTOR_INTS), p[12]
         to = at(w, h[CONSTRAINED.WORK_ROWS] + size * row)

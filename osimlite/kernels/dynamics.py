@@ -14,7 +14,8 @@ from osimlite.kernels.layout import (
     CONSTRAINED,
     CONTACT_WORK,
     DOF,
-    EQUILIBRIUM_INTS,
+    EQUILIBRIUM,
+    INERTIA,
     INERTIA_AT,
     ITEM,
     LINK,
@@ -105,8 +106,8 @@ def equilibrate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int)
     if status != OUTCOME.OK:
         return status
     for k in range(s[MODEL.EQUILIBRIA] - 1, -1, -1):
-        j = at(s, s[MODEL.EQUILIBRIUM_AT] + EQUILIBRIUM_INTS * k)
-        if call(j[0], s, x, w, y, f, j[1]) != OUTCOME.OK:
+        j = at(s, s[MODEL.EQUILIBRIUM_AT] + EQUILIBRIUM.SIZE * k)
+        if call(j[EQUILIBRIUM.KERNEL], s, x, w, y, f, j[EQUILIBRIUM.ITEM]) != OUTCOME.OK:
             status, f[0] = OUTCOME.UNSOLVED, k
     return status
 
@@ -130,14 +131,18 @@ def momentum(i: Floats, spin: Vector, velocity: Vector) -> tuple[Vector, Vector]
 def spatial_inertias_and_bias(s: Ints, x: Floats, w: Floats) -> None:
     """Inertias of the links, and the wrenches that are missing for their accelerations without udot."""
     for link in range(s[MODEL.LINKS]):
-        b, here = at(x, INERTIA_AT + 10 * link), link_work(s, w, link)
-        r, i, m = at(here, LINK_WORK.ROTATION), at(here, LINK_WORK.INERTIA), b[0]
-        center = plus(minus(vector(here, LINK_WORK.POSITION), vector(here, LINK_WORK.ORIGIN)), turned(r, vector(b, 1)))
+        b, here = at(x, INERTIA_AT + INERTIA.SIZE * link), link_work(s, w, link)
+        r, i, m = at(here, LINK_WORK.ROTATION), at(here, LINK_WORK.INERTIA), b[INERTIA.MASS]
+        center = plus(
+            minus(vector(here, LINK_WORK.POSITION), vector(here, LINK_WORK.ORIGIN)),
+            turned(r, vector(b, INERTIA.CENTER)),
+        )
         cx, cy, cz = center
         mx, my, mz = times(m, center)
         one, two, three = vector(r, 0), vector(r, 3), vector(r, 6)
         # Rows of R I.
-        first, second, third = spun(at(b, 4), one), spun(at(b, 4), two), spun(at(b, 4), three)
+        first, second = spun(at(b, INERTIA.MOMENTS), one), spun(at(b, INERTIA.MOMENTS), two)
+        third = spun(at(b, INERTIA.MOMENTS), three)
         i[0], i[1], i[2], i[3] = m, mx, my, mz
         i[4] = dot(first, one) + my * cy + mz * cz
         i[5] = dot(second, two) + mx * cx + mz * cz

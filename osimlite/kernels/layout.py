@@ -14,6 +14,9 @@ its tree, so that no digits are lost far away from ground's own origin.
 
 from __future__ import annotations
 
+from functools import cache
+from itertools import accumulate, count, islice
+
 
 class Record(type):
     """The metaclass of records: their attributes are offsets of fields, or numbers that stand for something.
@@ -21,50 +24,64 @@ class Record(type):
     Compiled kernels take one as they take a module, so that a field is a constant there.
     """
 
+    def record(cls, **values: int) -> list[int]:
+        """A record of these fields, in the order in which they are declared, up to SIZE or OWN.
+
+        Raises:
+            TypeError: a field is missing, or none has the name.
+        """
+        names = _names(cls)
+        if len(values) != len(names) or not values.keys() >= {*names}:
+            raise TypeError(f"{cls.__name__} has the fields {', '.join(names)}; got {', '.join(values)}")
+        return [values[name] for name in names]
+
+
+@cache
+def _names(record: Record) -> tuple[str, ...]:
+    """The fields of a record by their offsets."""
+    numbers = {name: number for name, number in vars(record).items() if name.isupper()}
+    end = numbers["SIZE" if "SIZE" in numbers else "OWN"]
+    offsets = {number: name for name, number in numbers.items() if 0 <= number < end}
+    return tuple(offsets[number] for number in range(end))
+
 
 # Integers: a head with counts and offsets, then records.
 class MODEL(metaclass=Record):
     """The head of s: counts, and where all else is."""
 
-    LINKS, DOFS, ITEMS, CONTACTS = 0, 1, 2, 3
+    _at = count()
+    LINKS, DOFS, ITEMS, CONTACTS = islice(_at, 4)
     """How many there are: links, degrees of freedom, items (forces and the like), contacts."""
-    LINK_AT, OPERATION_AT, DOF_AT, ITEM_AT = 4, 5, 6, 7
+    LINK_AT, OPERATION_AT, DOF_AT, ITEM_AT = islice(_at, 4)
     """Offsets of the records in s; at ITEM_AT are the offsets of the items' records."""
-    SUMMED, SUMMED_AT = 8, 9
+    SUMMED, SUMMED_AT = islice(_at, 2)
     """Count and offset of a list of the degrees of freedom whose columns are sums of several."""
-    FIXED_AT = 10
+    FIXED_AT = next(_at)
     """Offset in x of the fixed transforms of the operations, by rows and then the translation, and of axes of slides
-    (K, FIXED_NUMBERS)."""
-    WORK_LINK, WORK_OPERATION, WORK_COLUMN, WORK_PIVOT, WORK_CONTACT, WORK_STATE = 11, 12, 13, 14, 15, 16
+    (K, 15), see `FIXED`."""
+    WORK_LINK, WORK_OPERATION, WORK_COLUMN, WORK_PIVOT, WORK_CONTACT, WORK_STATE = islice(_at, 6)
     """Offsets in the work vector w of what is computed for links, operations, columns, pivots, contacts and states."""
-    WORK_SIZE = 17
+    WORK_SIZE = next(_at)
     """Length of w."""
-    CONTACT_AT = 18
+    CONTACT_AT = next(_at)
     """Where the offsets of the records of the pairs stand, by contact."""
-    CONSTRAINED = 19
+    CONSTRAINED = next(_at)
     """Offset of the record of all constraints, 0 if there are none."""
-    STATE_SIZE = 20
+    STATE_SIZE = next(_at)
     """Length of a state: values, speeds, and auxiliary states."""
-    CONTROLS, WORK_CONTROL = 21, 22
+    CONTROLS, WORK_CONTROL = islice(_at, 2)
     """Offset of the record of the controls, 0 if there are none; offset in w of the controls."""
-    EQUILIBRIA, EQUILIBRIUM_AT = 23, 24
-    """Count and offset of what can be brought into equilibrium: for each the address of the kernel that does it, and
-    the offset of its item."""
-    CHAIN = 25
+    EQUILIBRIA, EQUILIBRIUM_AT = islice(_at, 2)
+    """Count and offset of what can be brought into equilibrium, see `EQUILIBRIUM`."""
+    CHAIN = next(_at)
     """Offset of the record of the joints of another program that gives the mass matrix and the bias, 0 if there is
     none."""
-    RESPONSES, RESPONSE_AT = 26, 27
-    """Count and offset of the forces that push along one displacement: for each the address of the kernel that finds
-    their derivatives, the offset of its item, the offset among the item's integers of the first of those that say where
-    its states are, their count, and -1 if it pulls against the displacement, else 1."""
-    RUNS, RUN_AT = 28, 29
+    RESPONSES, RESPONSE_AT = islice(_at, 2)
+    """Count and offset of the forces that push along one displacement, see `RESPONSE`."""
+    RUNS, RUN_AT = islice(_at, 2)
     """Count and offset of runs of items that follow one another, see `RUN`."""
-    LAWS = 30
+    LAWS = next(_at)
     """From here on the addresses of the laws, by their number."""
-
-
-FIXED_NUMBERS, EQUILIBRIUM_INTS, RESPONSE_INTS = 15, 2, 5
-"""Sizes of a fixed transform, and of the entries of the lists at EQUILIBRIUM_AT and RESPONSE_AT."""
 
 
 class LINK(metaclass=Record):
@@ -101,6 +118,20 @@ class ITEM(metaclass=Record):
     LAW, NUMBERS, RECORD, FIRST_CONTACT, OWN = range(5)
 
 
+class EQUILIBRIUM(metaclass=Record):
+    """Of what can be brought into equilibrium: the address of the kernel that does it, and the offset of its item."""
+
+    KERNEL, ITEM, SIZE = range(3)
+
+
+class RESPONSE(metaclass=Record):
+    """Of a force that pushes along one displacement: the address of the kernel that finds its derivatives, the offset
+    of its item, the offset among the item's integers of the first of those that say where its states are, their count,
+    and -1 if it pulls against the displacement, else 1."""
+
+    KERNEL, ITEM, FIRST_STATE, STATES, SENSE, SIZE = range(6)
+
+
 class RUN(metaclass=Record):
     """Of items that are computed one after another: address of the kernel that computes all of them at once, 0 if each
     is computed by its own; numbers of the first and the end; offset in w of room for curves, see `curves_abreast`."""
@@ -111,40 +142,49 @@ class RUN(metaclass=Record):
 class CONSTRAINED(metaclass=Record):
     """Of all constraints."""
 
-    DYNAMICS, PROJECT, CONSTRAINTS, CONSTRAINT_AT = 0, 1, 2, 3
+    _at = count()
+    DYNAMICS, PROJECT, CONSTRAINTS, CONSTRAINT_AT = islice(_at, 4)
     """The laws that find accelerations and that project states; count of the constraints, and where the offsets of
     their records stand."""
-    EQUATIONS, POSITIONS, LOCKS, BALLS, BALL_AT, ENTRIES = 4, 5, 6, 7, 8, 9
+    EQUATIONS, POSITIONS, LOCKS, BALLS, BALL_AT, ENTRIES = islice(_at, 6)
     """Counts of the equations, of those that bind positions, and of coordinates that are just locked; count of the
     balls, and where the offsets of their arguments stand; count of the numbers of the mass matrix."""
-    WORK_ROWS, WORK_ERRORS, WORK_RATES, WORK_DRIFTS = 10, 11, 12, 13
+    WORK_ROWS, WORK_ERRORS, WORK_RATES, WORK_DRIFTS = islice(_at, 4)
     """Offsets in w of G (m, n), of the errors, and of what G u and G udot are to be."""
-    WORK_KEPT, WORK_FACTOR, WORK_SYSTEM, WORK_TRIAL = 14, 15, 16, 17
+    WORK_KEPT, WORK_FACTOR, WORK_SYSTEM, WORK_TRIAL = islice(_at, 4)
     """Offsets in w of scratch: for (m, n) numbers, for a factor of them, for solving, for states."""
-    FACTORISE, MINIMUM_NORM = 18, 19
+    FACTORISE, MINIMUM_NORM = islice(_at, 2)
     """The laws that factorise equations, and that solve them then."""
-    SIZE = 20
+    SIZE = next(_at)
 
 
 class CONSTRAINT(metaclass=Record):
-    """Of a constraint, after its law and the offset of its numbers: its equations, of which those up to the second end
-    bind positions, and from OWN on integers of its own."""
+    """Of a constraint: its law and the offset of its numbers; its equations, of which those up to the second end bind
+    positions, and from OWN on integers of its own."""
 
-    FIRST_EQUATION, END_EQUATION, END_POSITION, OWN = 2, 3, 4, 5
+    LAW, NUMBERS, FIRST_EQUATION, END_EQUATION, END_POSITION, OWN = range(6)
+
+
+class COORDINATE(metaclass=Record):
+    """Of a coordinate in a constraint: its degree of freedom, the place of the arguments of its ball or -1, and its
+    number among these."""
+
+    DOF, BALL, PART, SIZE = range(4)
 
 
 class CHAIN(metaclass=Record):
     """Of the joints of another program."""
 
-    DYNAMICS, SUPPLY, JOINTS, JOINT_AT = 0, 1, 2, 3
-    SHARES, SHARE_AT, PRODUCTS, PRODUCT_AT, EXCESSES, EXCESS_AT = 4, 5, 6, 7, 8, 9
+    _at = count()
+    DYNAMICS, SUPPLY, JOINTS, JOINT_AT = islice(_at, 4)
+    SHARES, SHARE_AT, PRODUCTS, PRODUCT_AT, EXCESSES, EXCESS_AT = islice(_at, 6)
     """The law that finds the mass matrix, the address of the kernel that asks the other program; counts and offsets of
     their records, of pairs of a joint and a degree of freedom that moves it, of products of two such shares, and of
     links to which the other program gives too much inertia."""
-    WORK_JOINTS, WORK_SHARES, ENTRY_AT, END_ENTRY = 10, 11, 12, 13
+    WORK_JOINTS, WORK_SHARES, ENTRY_AT, END_ENTRY = islice(_at, 4)
     """Offsets in w: of values, rates, accelerations without udot and forces of all joints and then the mass matrix, of
     the shares, and of the rows of our own mass matrix and their end."""
-    SIZE = 14
+    SIZE = next(_at)
 
 
 class JOINT(metaclass=Record):
@@ -152,6 +192,24 @@ class JOINT(metaclass=Record):
     a factor, and its first share."""
 
     KIND, SOURCE, PART, FIRST_SHARE, SIZE = range(5)
+
+
+class SHARE(metaclass=Record):
+    """What a degree of freedom has in a joint."""
+
+    JOINT, DOF, SIZE = range(3)
+
+
+class PRODUCT(metaclass=Record):
+    """Two shares, the entry of the other program's mass matrix that they take, and offset in w of what it adds to."""
+
+    ONE, TWO, ENTRY, PLACE, SIZE = range(5)
+
+
+class EXCESS(metaclass=Record):
+    """A link, the last degree of freedom on the way to it, and offset in x of what its inertia is too large by."""
+
+    LINK, DOF, NUMBER, SIZE = range(4)
 
 
 class JOINT_KIND(metaclass=Record):
@@ -163,13 +221,25 @@ class JOINT_KIND(metaclass=Record):
 
 # Numbers.
 GRAVITY_AT, INERTIA_AT = 0, 3
-"""Gravity in ground (3,); of each link mass, mass centre in the link, xx, yy, zz, xy, xz, yz about it (L, 10)."""
+"""Gravity in ground (3,), and of each link its `INERTIA`."""
+
+
+class INERTIA(metaclass=Record):
+    """Mass, mass centre in the link, xx, yy, zz, xy, xz, yz about it."""
+
+    MASS, CENTER, MOMENTS, SIZE = accumulate((1, 3, 6), initial=0)
+
+
+class FIXED(metaclass=Record):
+    """Of an operation: rotation by rows and translation of its fixed transform, and the axis of a slide."""
+
+    ROTATION, TRANSLATION, AXIS, SIZE = accumulate((9, 3, 3), initial=0)
 
 
 class WORK(metaclass=Record):
     """The head of w: the time (s), and room for what laws hand over."""
 
-    TIME, SCRATCH, SIZE = 0, 1, 32
+    TIME, SCRATCH, SIZE = accumulate((1, 31), initial=0)
 
 
 class LINK_WORK(metaclass=Record):
@@ -177,21 +247,23 @@ class LINK_WORK(metaclass=Record):
     acceleration while the derivatives of all speeds are zero (upwards against gravity); inertia (mass, first moment,
     xx, yy, zz, xy, xz, yz) and wrench of it, and of all that it carries too after the evaluation."""
 
-    ROTATION, POSITION, ORIGIN, VELOCITY, ACCELERATION, INERTIA, WRENCH, SIZE = 0, 9, 12, 15, 21, 27, 37, 44
+    ROTATION, POSITION, ORIGIN, VELOCITY, ACCELERATION, INERTIA, WRENCH, SIZE = accumulate(
+        (9, 3, 3, 6, 6, 10, 7), initial=0
+    )
 
 
 class OPERATION_WORK(metaclass=Record):
     """Work of an operation: the axis, or the frame by rows whose axes a ball's speeds are about; where that is; amount,
     rate and second derivative without udot, if a function gives them."""
 
-    AXIS, POINT, AMOUNT, RATE, CURVATURE, SIZE = 0, 9, 12, 13, 14, 16
+    AXIS, POINT, AMOUNT, RATE, CURVATURE, SIZE = accumulate((9, 3, 1, 1, 2), initial=0)
 
 
 class CONTACT_WORK(metaclass=Record):
     """Work of a contact: force on surface 2, its point, depth and radius of the law; force and depth are 0 without
     contact."""
 
-    FORCE, DEPTH, RADIUS, SIZE = 0, 6, 7, 8
+    FORCE, DEPTH, RADIUS, SIZE = accumulate((6, 1, 1), initial=0)
 
 
 # Kinds.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from osimlite.forces.rotations import Axes, X, Y, Z, along_axes, turned_axes
 from osimlite.forces.vectors import ZERO, Vector, along, cross, plus, put, times, vector
 from osimlite.kernels.layout import (
-    FIXED_NUMBERS,
+    FIXED,
     GRAVITY_AT,
     ITEM,
     LINK,
@@ -37,9 +37,9 @@ def place(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
         for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
             record = s[MODEL.OPERATION_AT] + OPERATION.SIZE * operation
             j, a = at(s, record), operation_work(s, w, operation)
-            b = at(x, s[MODEL.FIXED_AT] + FIXED_NUMBERS * operation)
+            b = at(x, s[MODEL.FIXED_AT] + FIXED.SIZE * operation)
             if j[OPERATION.BEFORE] != TRANSFORM.NOTHING:
-                origin = plus(origin, along_axes(axes, vector(b, 9)))
+                origin = plus(origin, along_axes(axes, vector(b, FIXED.TRANSLATION)))
                 if j[OPERATION.BEFORE] == TRANSFORM.MOVE:
                     axes = turned_axes(axes, axes_of(b))
             motion = j[OPERATION.MOTION]
@@ -56,7 +56,7 @@ def place(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
                     sine, cosine = sine_cosine(amount)
                     axes = along(times(cosine, one), sine, two), along(times(cosine, two), -sine, one), three
                 else:
-                    axis = along_axes(axes, vector(b, 12))
+                    axis = along_axes(axes, vector(b, FIXED.AXIS))
                     put(a, OPERATION_WORK.AXIS, axis)
                     origin = along(origin, amount, axis)
             else:

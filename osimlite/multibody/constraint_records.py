@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from osimlite.errors import UnsupportedError
 from osimlite.kernels.constraint_equations import ARM, AXIS, DISTANCE, MEETING, PRODUCT, SLIP
-from osimlite.kernels.layout import CONSTRAINED
+from osimlite.kernels.layout import COORDINATE
 from osimlite.kernels.least_squares import factor_room
 from osimlite.multibody import body_constraints as b
 from osimlite.multibody.constraints import Constraint, Coupler, Lock, Prescribed
@@ -87,29 +87,28 @@ def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> C
     )
 
 
-def room_for(equations: int, size: int, entries: int) -> dict[int, int]:
-    """Lengths of the parts of the work vector, by their places in the record of all constraints."""
+def room_for(equations: int, size: int, entries: int) -> dict[str, int]:
+    """Lengths of the parts of the work vector, by their fields in the record of all constraints."""
     rows = equations * size
     by_multipliers, by_directions = 2 * (equations + size), 2 * (equations + size + size * size)
     return {
-        CONSTRAINED.WORK_ROWS: rows,
-        CONSTRAINED.WORK_ERRORS: equations,
-        CONSTRAINED.WORK_RATES: equations,
-        CONSTRAINED.WORK_DRIFTS: equations,
-        CONSTRAINED.WORK_KEPT: rows,
-        CONSTRAINED.WORK_FACTOR: factor_room(equations, size),
-        CONSTRAINED.WORK_SYSTEM: entries + size + max(by_multipliers, by_directions),
-        CONSTRAINED.WORK_TRIAL: 6 * size,
+        "WORK_ROWS": rows,
+        "WORK_ERRORS": equations,
+        "WORK_RATES": equations,
+        "WORK_DRIFTS": equations,
+        "WORK_KEPT": rows,
+        "WORK_FACTOR": factor_room(equations, size),
+        "WORK_SYSTEM": entries + size + max(by_multipliers, by_directions),
+        "WORK_TRIAL": 6 * size,
     }
 
 
 def _coordinate(place: int, places: Places, balls: Balls) -> list[int]:
-    """Degree of freedom of a coordinate, the place of the arguments of its ball or -1, and its number among these."""
     freedom = places.freedom(place)
     for freedoms, arguments in balls.items():
         if freedom in freedoms:
-            return [freedom, arguments, freedoms.index(freedom)]
-    return [freedom, -1, 0]
+            return COORDINATE.record(DOF=freedom, BALL=arguments, PART=freedoms.index(freedom))
+    return COORDINATE.record(DOF=freedom, BALL=-1, PART=0)
 
 
 def _coupler(constraint: Coupler, places: Places, balls: Balls) -> ConstraintRecord:

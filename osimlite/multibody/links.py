@@ -11,6 +11,9 @@ from osimlite.errors import UnsupportedError
 from osimlite.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM
 from osimlite.kernels.layout import (
     CONSTRAINED,
+    CONSTRAINT,
+    DOF,
+    LINK,
     LINK_WORK,
     MODEL,
     MOTION,
@@ -286,8 +289,11 @@ class LinkPacker:
         above, carrying, operation = [-1] * self.ends[-1], [-1] * len(self.links), 0
         for number, link in enumerate(self.links):
             first, end = self.ends[number], self.ends[number + 1]
-            self.ints += [link.parent, operation, operation + len(link.operations), first, end]
-            operation += len(link.operations)
+            behind = operation + len(link.operations)
+            self.ints += LINK.record(
+                PARENT=link.parent, FIRST_OPERATION=operation, END_OPERATION=behind, FIRST_DOF=first, END_DOF=end
+            )
+            operation = behind
             last = carrying[link.parent] if link.parent >= 0 else -1
             for freedom in range(first, end):
                 above[freedom], last = last, freedom
@@ -300,7 +306,7 @@ class LinkPacker:
         depths: list[int] = []
         for freedom in above:
             depths.append(depths[freedom] + 1 if freedom >= 0 else 0)
-            self.ints += [freedom, self.room(depths[-1] + 1), depths[-1]]
+            self.ints += DOF.record(ABOVE=freedom, ROW=self.room(depths[-1] + 1), DEPTH=depths[-1])
             self.entries += depths[-1] + 1
         self.ints[MODEL.SUMMED_AT] = len(self.ints)
         summed = [number for number in range(len(above)) if not self.is_alone(number)]
@@ -345,17 +351,18 @@ class LinkPacker:
             self.ints += [*freedoms, *looked_at]
             if item.kind in (MOTION.BALL, MOTION.BALL_BACK):
                 self.balls[tuple(freedoms)] = arguments
-            record = [item.kind, _kind_of(item.before), freedom, law, arguments, len(freedoms), extra, gradient]
-            self.ints[start + OPERATION.SIZE * number : start + OPERATION.SIZE * (number + 1)] = record
+            self.ints[start + OPERATION.SIZE * number : start + OPERATION.SIZE * (number + 1)] = OPERATION.record(
+                MOTION=item.kind, BEFORE=_kind_of(item.before), DOF=freedom, FUNCTION=law,
+                ARGUMENTS=arguments, ARGUMENT_COUNT=len(freedoms), EXTRA=extra, GRADIENT=gradient,
+            )  # fmt: skip
 
     def constraint_records(self, kept: Sequence[Constraint], locks: int) -> None:
         """Write what constraints need, if there are any."""
         if not kept:
             return
         start, size = len(self.ints), self.ints[MODEL.DOFS]
-        head = [0] * CONSTRAINED.SIZE
         self.ints[MODEL.CONSTRAINED] = start
-        self.ints += head
+        self.ints += [0] * CONSTRAINED.SIZE
         constraints = [constraint_record(item, self.places, self.balls) for item in kept]
         records: list[int] = []
         equations = 0
@@ -365,26 +372,23 @@ class LinkPacker:
             ints = [
                 x + self.room(constraint.room) if k == constraint.room_at else x for k, x in enumerate(constraint.ints)
             ]
-            self.ints += [self.law(constraint.law), len(self.numbers), equations, end, end_position, *ints]
+            self.ints += CONSTRAINT.record(
+                LAW=self.law(constraint.law), NUMBERS=len(self.numbers),
+                FIRST_EQUATION=equations, END_EQUATION=end, END_POSITION=end_position,
+            )  # fmt: skip
+            self.ints += ints
             self.numbers += constraint.numbers
             equations = end
-        head[CONSTRAINED.DYNAMICS], head[CONSTRAINED.PROJECT] = self.law("constrained_dynamics"), self.law("project")
-        head[CONSTRAINED.FACTORISE], head[CONSTRAINED.MINIMUM_NORM] = (
-            self.law("factorise_law"),
-            self.law("minimum_norm_law"),
-        )
-        head[CONSTRAINED.CONSTRAINTS], head[CONSTRAINED.CONSTRAINT_AT] = len(constraints), len(self.ints)
-        self.ints += records
-        head[CONSTRAINED.BALLS], head[CONSTRAINED.BALL_AT] = len(self.balls), len(self.ints)
-        self.ints += self.balls.values()
-        head[CONSTRAINED.EQUATIONS], head[CONSTRAINED.POSITIONS] = (
-            equations,
-            sum(constraint.positions for constraint in constraints),
-        )
-        head[CONSTRAINED.LOCKS], head[CONSTRAINED.ENTRIES] = locks, self.entries
-        for place, count in room_for(equations, size, self.entries).items():
-            head[place] = self.room(count)
-        self.ints[start : start + CONSTRAINED.SIZE] = head
+        record_at, ball_at = len(self.ints), len(self.ints) + len(records)
+        self.ints += [*records, *self.balls.values()]
+        self.ints[start : start + CONSTRAINED.SIZE] = CONSTRAINED.record(
+            DYNAMICS=self.law("constrained_dynamics"), PROJECT=self.law("project"),
+            FACTORISE=self.law("factorise_law"), MINIMUM_NORM=self.law("minimum_norm_law"),
+            CONSTRAINTS=len(constraints), CONSTRAINT_AT=record_at, BALLS=len(self.balls), BALL_AT=ball_at,
+            EQUATIONS=equations, POSITIONS=sum(constraint.positions for constraint in constraints),
+            LOCKS=locks, ENTRIES=self.entries,
+            **{name: self.room(count) for name, count in room_for(equations, size, self.entries).items()},
+        )  # fmt: skip
 
 
 def _kind_of(matrix: Array) -> int:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from osimlite.kernels.curves_abreast import LANES, ROWS
-from osimlite.kernels.layout import CONTACT_WORK, ITEM, MODEL
+from osimlite.kernels.layout import CONTACT_WORK, EQUILIBRIUM, ITEM, MODEL, RESPONSE, RUN
 from osimlite.kernels.pointers import Floats, Ints
 from osimlite.kernels.record import STATES
 from osimlite.multibody.links import LinkPacker, Placement, Tree, tree_of
@@ -132,7 +132,7 @@ class Packer(LinkPacker):
                 for number, path in item.looks_at:
                     own[number] += places[path]
                 places[element.path] = place
-                self.ints += [0, len(self.numbers), place, first, *own]
+                self.ints += [*self.item_head(place, first), *own]
                 self.numbers += item.numbers
         self.ints[MODEL.ITEMS], self.ints[MODEL.ITEM_AT] = len(records), len(self.ints)
         self.ints += records
@@ -141,18 +141,25 @@ class Packer(LinkPacker):
         self.ints[MODEL.EQUILIBRIA], self.ints[MODEL.EQUILIBRIUM_AT] = len(settling), len(self.ints)
         for place, kernel in settling.items():
             self.equilibria[len(self.ints)] = kernel
-            self.ints += [0, place]
+            self.ints += EQUILIBRIUM.record(KERNEL=0, ITEM=place)
         self.ints[MODEL.RESPONSES], self.ints[MODEL.RESPONSE_AT] = len(responding), len(self.ints)
         for place, response in responding.items():
             self.responses[len(self.ints)] = response.kernel
-            self.ints += [0, place, ITEM.OWN + response.first_state, response.states, response.sense]
+            first_state = ITEM.OWN + response.first_state
+            self.ints += RESPONSE.record(
+                KERNEL=0, ITEM=place, FIRST_STATE=first_state, STATES=response.states, SENSE=response.sense
+            )
         room = self.room(LANES * ROWS) if any(kernel for kernel, _ in runs) else 0
         self.ints[MODEL.RUNS], self.ints[MODEL.RUN_AT] = len(runs), len(self.ints)
         for (kernel, first), end in zip(runs, [*(run[1] for run in runs[1:]), len(records)], strict=False):
             if end - first >= FEWEST and kernel:
                 self.runs[len(self.ints)] = kernel
-            self.ints += [0, first, end, room]
+            self.ints += RUN.record(LAW=0, FIRST=first, END=end, ROOM=room)
         return result
+
+    def item_head(self, place: int, first_contact: int) -> list[int]:
+        """What stands before an item's own integers, its law not known yet."""
+        return ITEM.record(LAW=0, NUMBERS=len(self.numbers), RECORD=place, FIRST_CONTACT=first_contact)
 
     def control_record(self) -> None:
         """Write the controls, if there are any, behind all else: some motions have others there."""
@@ -160,5 +167,5 @@ class Packer(LinkPacker):
             return
         self.ints[MODEL.CONTROLS] = len(self.ints)
         own, numbers, self.kernels[len(self.ints)] = self.controls.record()
-        self.ints += [0, len(self.numbers), self.ints[MODEL.WORK_CONTROL], 0, *own]
+        self.ints += [*self.item_head(self.ints[MODEL.WORK_CONTROL], 0), *own]
         self.numbers += numbers

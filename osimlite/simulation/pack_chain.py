@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from osimlite.kernels.layout import CHAIN, DOF, JOINT, JOINT_KIND, MODEL, MOTION
+from osimlite.kernels.layout import CHAIN, DOF, EXCESS, JOINT, JOINT_KIND, MODEL, MOTION, PRODUCT, SHARE
 from osimlite.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
 from osimlite.multibody.parts import GROUND
 from osimlite.robot.lines import as_line
@@ -33,29 +33,31 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
     if not count:
         return
     start = ints[MODEL.CHAIN] = len(ints)
-    head = [0] * CHAIN.SIZE
-    ints += head
+    ints += [0] * CHAIN.SIZE
     packer.kernels[start + CHAIN.SUPPLY] = chain.supply
-    head[CHAIN.DYNAMICS], head[CHAIN.JOINTS] = packer.law("chain_dynamics"), count
     records: list[int] = []
     shares: list[tuple[int, int]] = []
     for number, joint in enumerate(chain.joints):
         kind, source, part, freedoms = _followed(packer, joint)
-        records += [kind, source, part, len(shares)]
+        records += JOINT.record(KIND=kind, SOURCE=source, PART=part, FIRST_SHARE=len(shares))
         shares += [(number, freedom) for freedom in freedoms]
+    parts = [item for joint, freedom in shares for item in SHARE.record(JOINT=joint, DOF=freedom)]
     lists = {
-        (CHAIN.JOINTS, CHAIN.JOINT_AT): (JOINT.SIZE, records),
-        (CHAIN.SHARES, CHAIN.SHARE_AT): (2, [item for share in shares for item in share]),
-        (CHAIN.PRODUCTS, CHAIN.PRODUCT_AT): (4, _products(packer, shares, count)),
-        (CHAIN.EXCESSES, CHAIN.EXCESS_AT): (3, _excesses(packer, chain.excess)),
+        ("JOINTS", "JOINT_AT"): (JOINT.SIZE, records),
+        ("SHARES", "SHARE_AT"): (SHARE.SIZE, parts),
+        ("PRODUCTS", "PRODUCT_AT"): (PRODUCT.SIZE, _products(packer, shares, count)),
+        ("EXCESSES", "EXCESS_AT"): (EXCESS.SIZE, _excesses(packer, chain.excess)),
     }
+    places: dict[str, int] = {}
     for (length, place), (each, numbers) in lists.items():
-        head[length], head[place] = len(numbers) // each, len(ints)
+        places |= {length: len(numbers) // each, place: len(ints)}
         ints += numbers
-    head[CHAIN.WORK_JOINTS], head[CHAIN.WORK_SHARES] = packer.room((4 + count) * count), packer.room(len(shares))
-    head[CHAIN.ENTRY_AT] = ints[ints[MODEL.DOF_AT] + DOF.ROW]
-    head[CHAIN.END_ENTRY] = head[CHAIN.ENTRY_AT] + packer.entries
-    ints[start : start + CHAIN.SIZE] = head
+    entries = ints[ints[MODEL.DOF_AT] + DOF.ROW]
+    ints[start : start + CHAIN.SIZE] = CHAIN.record(
+        DYNAMICS=packer.law("chain_dynamics"), SUPPLY=0,
+        WORK_JOINTS=packer.room((4 + count) * count), WORK_SHARES=packer.room(len(shares)),
+        ENTRY_AT=entries, END_ENTRY=entries + packer.entries, **places,
+    )  # fmt: skip
 
 
 def _followed(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, list[int]]:
@@ -93,7 +95,7 @@ def _products(packer: Packer, shares: Sequence[tuple[int, int]], count: int) -> 
         while other >= 0:
             for one, i in of_freedom[freedom]:
                 for two, j in of_freedom[other]:
-                    result += one, two, count * i + j, place
+                    result += PRODUCT.record(ONE=one, TWO=two, ENTRY=count * i + j, PLACE=place)
             place, other = place + 1, freedoms[DOF.SIZE * other + DOF.ABOVE]
     return result
 
@@ -106,6 +108,6 @@ def _excesses(packer: Packer, excess: Sequence[tuple[int, float]]) -> list[int]:
         while carrier != GROUND and packer.ends[carrier] == packer.ends[carrier + 1]:
             carrier = packer.links[carrier].parent
         if carrier != GROUND:
-            result += link, packer.ends[carrier + 1] - 1, len(packer.numbers)
+            result += EXCESS.record(LINK=link, DOF=packer.ends[carrier + 1] - 1, NUMBER=len(packer.numbers))
             packer.numbers.append(moment)
     return result

@@ -226,8 +226,8 @@ class System:
             # Kernels as Python raise what machine code computes as no number.
             raise SimulationError(f"the equilibrium of the muscles cannot be computed: {failure}") from failure
         if status == OUTCOME.UNSOLVED:
-            place = self.structure[MODEL.EQUILIBRIUM_AT] + layout.EQUILIBRIUM_INTS * int(self._f[0])
-            muscle = self._told(self.structure[place + 1])
+            place = self.structure[MODEL.EQUILIBRIUM_AT] + layout.EQUILIBRIUM.SIZE * int(self._f[0])
+            muscle = self._told(self.structure[place + layout.EQUILIBRIUM.ITEM])
             raise SimulationError(f"no equilibrium was found of {muscle}; start elsewhere, or without an equilibrium")
         if status != OUTCOME.OK:
             raise self.refusal(status, t, y)
@@ -421,8 +421,8 @@ class System:
     @property
     def inertia(self) -> Floats:
         """Mass, mass centre and inertia of all links (l, 10)."""
-        count = 10 * len(self._links)
-        return self.numbers[layout.INERTIA_AT : layout.INERTIA_AT + count].reshape(-1, 10)
+        size = layout.INERTIA.SIZE
+        return self.numbers[layout.INERTIA_AT :][: size * len(self._links)].reshape(-1, size)
 
     @cached_property
     def masses_in_ground(self) -> list[tuple[float, Floats]]:
