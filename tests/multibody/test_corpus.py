@@ -11,11 +11,9 @@ import pytest
 from osimlite.document.reader import read_text
 from osimlite.errors import SimulationError
 from osimlite.multibody import build_mechanism
+from tests.conftest import ROUNDED
 
 _TYPES = (None, "rotational", "translational", "coupled")
-
-# What is on record was computed from the files as published, where these hold more digits than OpenSim converts.
-_ROUNDED = {"m0079": 1e-6, "m0109": 1e-7, "m0168": 1e-7, "m0172": 1e-8}
 
 
 def _mechanism_and_truth(corpus_model):
@@ -34,7 +32,7 @@ def test_real_models_stand_as_in_opensim(corpus_model):
     ]
     assert mechanism.total_mass == pytest.approx(truth["total_mass"], rel=1e-11, abs=1e-15)
     tree_order = [place for body in mechanism.bodies for place in body.mobilizer.coordinates]
-    near = _ROUNDED.get(corpus_model.id, 1e-10)
+    near = ROUNDED.get(corpus_model.id, 1e-10)
     for pose in (truth["default_pose"], truth["pose2"]):
         q = np.array(pose["q"])
         for path, (position, rotation) in pose["body_xform"].items():
