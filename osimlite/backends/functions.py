@@ -59,17 +59,25 @@ class CasadiModel(StatedModel):
     the parameters p, named by `parameters`. Units are those of OpenSim's files of states: m, rad, s, N.
     Where a result does not exist (a joint stands where its rates are not defined), it is not a number.
 
-    The arguments and attributes are those of :class:`osimlite.backends.stated.StatedModel`.
+    The arguments and attributes are those of :class:`osimlite.backends.stated.StatedModel`, and:
+
+    Args:
+        loads_given: whether t has, behind the time, what the functions of time of measured and prescribed forces are
+            then (`loads`; of a model with parameters it has none): thousands of knots are no formula to look through.
     """
 
-    def __init__(self, model: Model, parameters: Sequence[str], folder: Path, *, apart: bool = False) -> None:
+    def __init__(
+        self, model: Model, parameters: Sequence[str], folder: Path, *, apart: bool = False, loads_given: bool = False
+    ) -> None:
         # Before all else: it says what is missing.
         from osimlite.backends.symbols import casadi as library
+        from osimlite.backends.traced import given_loads
 
         self._library = library
         super().__init__(model, parameters, folder, apart=apart)
+        self.loads = given_loads(self.forces.elements) if loads_given and not parameters else []
         self._symbols = {
-            "t": library.SX.sym("t"),
+            "t": library.SX.sym("t", 1 + len(self.loads)),
             "x": library.SX.sym("x", len(self.states)),
             "xdot": library.SX.sym("xdot", len(self.states)),
             "u": library.SX.sym("u", len(self.controls)),
@@ -132,10 +140,11 @@ class CasadiModel(StatedModel):
             self._packed,
             self.forces,
             numbers,
-            self._symbols["t"],
+            self._symbols["t"][0],
             self._engine_order("x"),
             self._entries("u"),
             equations,
+            self._entries("t")[1:],
         )
 
     def _entries(self, name: str) -> list[Any]:
@@ -242,7 +251,8 @@ class CasadiModel(StatedModel):
         body = next(body for body in bodies if body.mobilizer.joint == path)
         link = placements[bodies.index(body)].link
         if link == (GROUND if body.parent == GROUND else placements[body.parent].link):
-            return CasadiModel(self._model, self.parameters, self._folder, apart=True).joint_load(path, side)
+            choices = {"apart": True, "loads_given": bool(self.loads)}
+            return CasadiModel(self._model, self.parameters, self._folder, **choices).joint_load(path, side)
         # The body that the joint carries in the tree gets what is missing there, the other one the opposite.
         sign = 1.0 if (side == "child") != body.mobilizer.reversed else -1.0
         size, xdot = len(self.coordinates), self._engine_order("xdot")

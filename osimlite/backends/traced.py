@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
+from contextlib import nullcontext
 from functools import reduce
 from typing import Any
 
@@ -17,7 +18,9 @@ from osimlite.kernels.constraint_equations import add_wrench
 from osimlite.kernels.dynamics import evaluate, inverse
 from osimlite.kernels.layout import CONSTRAINED, ITEM, MODEL, RUN, STAGE, WORK
 from osimlite.kernels.pointers import address, call
+from osimlite.multibody.functions import Function
 from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.geometries.load import Load, find_load
 from osimlite.simulation.engines.linking import PYTHON, Program
 from osimlite.simulation.pack import Packed
 
@@ -49,6 +52,7 @@ class Traced:
         y: the state, in the order of the packed model.
         controls: of the actuators.
         equations: numbers of those of the constraints that the others follow from.
+        loads: at this time, one after the other as `given_loads` has them; none if they are computed of the time.
 
     Raises:
         UnsupportedError: a force has no formula; the message names it.
@@ -63,8 +67,9 @@ class Traced:
         y: Sequence[Any],
         controls: Sequence[Any],
         equations: Sequence[int] = (),
+        loads: Sequence[Any] = (),
     ) -> None:
-        self._packed, self._elements = packed, forces.elements
+        self._packed, self._elements, self._loads = packed, forces.elements, loads
         self.numbers, self._t, self._y, self._controls = numbers, t, y, controls
         given: dict[int, int] = {}
         for place, kernel in packed.kernels.items():
@@ -153,7 +158,8 @@ class Traced:
             w[WORK.TIME] = self._t
             for k, control in enumerate(self._controls):
                 w[self.structure[MODEL.WORK_CONTROL] + k] = control
-            result = law(s, x, w, y, f)
+            with standing_in(find_load, self._find_load) if self._loads else nullcontext():
+                result = law(s, x, w, y, f)
             return Evaluated(s, x, w, f, result, ways.run.failures)
 
         try:
@@ -164,6 +170,22 @@ class Traced:
             raise UnsupportedError(
                 f"{whose} has no formula for CasADi: {error}; set its appliesForce to false, or take another class"
             ) from error
+
+    def _find_load(self, g: Vector, gp: Vector, room: Vector, t: Any) -> None:
+        """As :func:`find_load`, of what is given."""
+        owner = self._packed.owners[max(item for item in self._packed.owners if item <= g.first)]
+        element: Any = self._elements[owner]
+        first = len(given_loads(self._elements[:owner]))
+        for group, functions in enumerate(element.place.groups):
+            for k in range(len(functions)):
+                room[3 * group + k] = self._loads[first + k]
+            first += len(functions)
+
+
+def given_loads(elements: Sequence[Any]) -> list[Function]:
+    """The functions of time of all forces, points and torques that are given."""
+    loads = (element.place for element in elements if isinstance(getattr(element, "place", None), Load))
+    return [function for load in loads for group in load.groups for function in group]
 
 
 class Evaluated:

@@ -68,7 +68,7 @@ class Asked:
         name = f" '{part.name}'" if part.name else ""
         return DocumentError(f"{_tag(part)}{name}: {reason}", **self._placed(part))
 
-    def expect(self, part: Object, name: str, known: Iterable[str], what: str) -> None:
+    def expect(self, part: Object, name: str, known: Iterable[str], what: str, whose: str = "the model") -> None:
         """Refuse a name that is none, with the nearest one that is.
 
         Raises:
@@ -76,7 +76,7 @@ class Asked:
         """
         known = [*known]
         if name not in known:
-            raise self.wrong(part, f"the model has no {what} '{name}'{did_you_mean(name, known)}")
+            raise self.wrong(part, f"{whose} has no {what} '{name}'{did_you_mean(name, known)}")
 
     def expect_sound(self, whole: Object) -> None:
         """Refuse what has a part that is none, or a value that cannot be; its model is left aside.

@@ -46,17 +46,13 @@ class Dynamics:
         speeds = point.x[size : 2 * size]
         if self.is_implicit:
             accelerations = point.derivatives[:size]
-        elif f.constraints_kept:
-            # M udot = what pushes; the factor of the mass matrix is sparse where the bodies' tree is.
-            none = casadi.SX.zeros(len(f.states))
-            missing = f.residual(point.t, point.x, none, point.u, point.p, point.multipliers)[size : 2 * size]
-            symbol = casadi.SX.sym("udot", len(f.states))
-            rows = f.residual(point.t, point.x, symbol, point.u, point.p, point.multipliers)[size : 2 * size]
-            mass = casadi.jacobian(rows, symbol[size : 2 * size])
-            accelerations = casadi.ldl_solve(-missing, *casadi.ldl(mass))
         else:
-            found = f.dynamics(point.t, point.x, point.u, point.p)
-            return self._with_rates(point, casadi.vertcat(speeds, found[size:]))
+            # M udot = what pushes.
+            accelerations = casadi.SX.sym("udot", size)
+            none, others = casadi.SX.zeros(size), casadi.SX.zeros(len(f.states) - 2 * size)
+            udot = casadi.vertcat(none, accelerations, others)
+            rows = f.residual(point.t, point.x, udot, point.u, point.p, point.multipliers)[size : 2 * size]
+            point.solved.append((accelerations, rows))
         return self._with_rates(point, casadi.vertcat(speeds, accelerations, self._auxiliary(point)))
 
     def _with_rates(self, point: Point, rates: Formula) -> Formula:

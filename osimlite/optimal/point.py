@@ -31,6 +31,11 @@ class Series:
     values: Callable[[Array], Array]
     factor: int | None = None
 
+    def at(self, t: Formula, known: Formula) -> Formula:
+        """The value; exact to the second derivative, as what is known is renewed for each time."""
+        first, since = 1 + 3 * self.number, t - known[0]
+        return known[first] + since * (known[first + 1] + 0.5 * since * known[first + 2])
+
 
 class Frame(NamedTuple):
     """Where a frame is in ground, and how it moves."""
@@ -47,7 +52,7 @@ class Point:
 
     Attributes:
         problem: that is solved.
-        t: time, s.
+        t: time, s, and behind it the loads of the model (`problem.functions.loads`).
         x: the whole state in the order of `problem.functions.states`, what is prescribed included.
         u: controls, in the order of `problem.functions.controls`.
         multipliers: of the model's constraints.
@@ -58,6 +63,8 @@ class Point:
         known: what the series are made of: the time that they are expanded about, and three numbers for each.
         projections: values and speeds that the interval leads to, before they are moved onto the constraints, if the
             point has them.
+        solved: symbols in the formulas for what linear equations with a symmetric matrix determine, each with what is
+            zero then: accelerations.
     """
 
     problem: Problem
@@ -71,6 +78,7 @@ class Point:
     parameters: Formula
     known: Formula
     projections: Formula = field(default_factory=lambda: casadi.SX(0, 1))
+    solved: list[tuple[Formula, Formula]] = field(default_factory=list)
     _kept: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
@@ -89,9 +97,8 @@ class Point:
         return self.u[self.problem.functions.controls.index(path)]
 
     def at(self, series: Series) -> Formula:
-        """What a series is at this time; exact to the second derivative, as the numbers are renewed for each time."""
-        first, since = 1 + 3 * series.number, self.t - self.known[0]
-        value = self.known[first] + since * (self.known[first + 1] + 0.5 * since * self.known[first + 2])
+        """What a series is at this time."""
+        value = series.at(self.t[0], self.known)
         return value if series.factor is None else self.parameters[series.factor] * value
 
     @cached_property
@@ -146,7 +153,7 @@ class Ends:
     @property
     def duration(self) -> Formula:
         """S."""
-        return self.end.t - self.start.t
+        return self.end.t[0] - self.start.t[0]
 
 
 COST = ("cost",)

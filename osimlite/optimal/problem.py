@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from osimlite._load import module_name
-from osimlite.backends.functions import casadi as functions_of
+from osimlite.backends.functions import CasadiModel
 from osimlite.backends.symbols import casadi
 from osimlite.errors import SettingError
 from osimlite.modifying.processing import processed
@@ -24,6 +24,7 @@ from osimlite.optimal.given_motion import GivenDynamics, GivenMotion, Motion, mo
 from osimlite.optimal.layout import PROJECTED
 from osimlite.optimal.point import Formula, Point, Rows, Series, Terms, integral
 from osimlite.optimal.schemes import Grid, scheme_named
+from osimlite.optimal.tables import over_time
 from osimlite.records import replace
 from osimlite.schema.base import Component, Object
 from osimlite.schema.controllers import Controller
@@ -62,6 +63,7 @@ class Problem(Asked):
         grid: the points.
         goals: those that count, with what they consist of.
         path_rows: of the path constraints.
+        loads: the functions of time of the model's forces (`functions.loads`).
 
     Raises:
         UnsupportedError: there is something that is not solved here; it says where in the file.
@@ -93,6 +95,7 @@ class Problem(Asked):
         motion = motion or self._motion()
         self.components = {part.path: part for part in self.model.walk() if isinstance(part, Component)}
         self._refuse_parts()
+        self.loads: list[Series] = []
         paths = {parameter.name: self.parameter_paths(parameter) for parameter in self.phase.parameters}
         self.functions: Any = self._functions([path for own in paths.values() for path in own], motion)
         if not self.functions.states:
@@ -184,11 +187,13 @@ class Problem(Asked):
     def _functions(self, parameters: list[str], motion: Motion | None) -> Any:
         if motion is None:
             try:
-                return functions_of(self.model, parameters, self.folder)
+                functions = CasadiModel(self.model, parameters, self.folder, loads_given=True)
             except SettingError as error:
                 owners = (part for part in self.phase.parameters if any(
                     f"'{path}'" in error.message for path in self.parameter_paths(part)))  # fmt: skip
                 raise self.wrong(next(owners, self.phase), error.message) from None
+            self.loads = [self.given(partial(over_time, load)) for load in functions.loads]
+            return functions
         if parameters:
             raise self.refused(self.phase, f"parameters ({parameters[0]}) where the motion is given")
         return GivenMotion(self.model, motion, self.folder)

@@ -85,21 +85,41 @@ class PointFormula:
         ]
         column = casadi.vertcat(duration * casadi.vertcat(*rates), *rows, *integrands)
         # What is common is found before anything is differentiated: later that takes ten times as long, and finds less.
-        column = casadi.cse(casadi.densify(column))
+        solved, equations = (casadi.vertcat(SX(0, 1), *(pair[k] for pair in point.solved)) for k in range(2))
         self.labels, self.limits, self.rows = labels, limits, column.numel()
-        given, both, multipliers = [s, z, place, known], casadi.vertcat(s, z), SX.sym("multipliers", self.rows)
-        jacobian = casadi.jacobian(column, both)
+        parts = casadi.cse(casadi.densify(casadi.vertcat(column, equations)))
+        self._given, self._both, self._unknown = [s, z, place, known], casadi.vertcat(s, z), solved
+        self._column, self._equations = parts[: self.rows], parts[self.rows :]
+        slopes, width = casadi.jacobian(parts, casadi.vertcat(self._both, solved)), self._both.numel()
+        jacobian, self._by_solved = slopes[: self.rows, :width], slopes[: self.rows, width:]
+        self._value, self._moved = SX(0, 1), SX(0, width)
+        if solved.numel():
+            # Not differentiated is how the equations are solved: slopes follow from theirs.
+            self._factors = casadi.ldl(slopes[self.rows :, width:])
+            self._value = casadi.ldl_solve(-casadi.substitute(self._equations, solved, 0), *self._factors)
+            self._moved = -casadi.sparsify(casadi.ldl_solve(slopes[self.rows :, :width], *self._factors))
+            jacobian += self._by_solved @ self._moved
         self.jacobian_entries = [*map(np.array, jacobian.sparsity().get_triplet())]
-        self.value = casadi.Function("F", given, [column])
-        self.slope = casadi.Function("J", given, [casadi.vertcat(*jacobian.nonzeros())], {"cse": True})
-        self._hessian_parts: Any = [*given, multipliers], casadi.dot(multipliers, column), both
+        self.value = self._function("F", self._given, self._column)
+        self.slope = self._function("J", self._given, casadi.vertcat(*jacobian.nonzeros()))
+
+    def _function(self, name: str, given: list[Any], column: Any) -> Any:
+        """One whose formula has the solutions of the equations in the places of their symbols."""
+        return casadi.Function(name, given, [casadi.substitute(column, self._unknown, self._value)])
 
     @cached_property
     def curvature(self) -> tuple[Any, list[Any]]:
         """The second derivatives, with their rows and columns; they are only made if they are asked for."""
-        given, combined, both = self._hessian_parts
-        hessian = casadi.triu(casadi.hessian(combined, both)[0])
-        function = casadi.Function("H", given, [casadi.vertcat(*hessian.nonzeros())])
+        multipliers, pushes = SX.sym("multipliers", self.rows), SX.sym("pushes", self._unknown.numel())
+        combined = casadi.dot(multipliers, self._column) + casadi.dot(pushes, self._equations)
+        hessian = casadi.hessian(combined, casadi.vertcat(self._both, self._unknown))[0]
+        if self._unknown.numel():
+            # With these multipliers of the equations the sum does not depend on their solution.
+            found = casadi.ldl_solve(-self._by_solved.T @ multipliers, *self._factors)
+            along = casadi.vertcat(SX.eye(self._both.numel()), self._moved)
+            hessian = casadi.substitute(along.T @ hessian @ along, pushes, found)
+        hessian = casadi.triu(hessian)
+        function = self._function("H", [*self._given, multipliers], casadi.vertcat(*hessian.nonzeros()))
         return function, [*map(np.array, hessian.sparsity().get_triplet())]
 
 
@@ -180,9 +200,10 @@ class Program:
         parameters = [s[2 + owner] for owner in self.problem.parameter_owners]
         u = SX(len(self.problem.functions.controls), 1)
         u[[*map(self.problem.functions.controls.index, self.problem.controls)]] = parts["controls"]
+        t = s[0] + place * (s[1] - s[0])
         return Point(
             problem=self.problem,
-            t=s[0] + place * (s[1] - s[0]),
+            t=casadi.vertcat(t, *(series.at(t, known) for series in self.problem.loads)),
             x=parts["states"],
             u=u,
             multipliers=parts["multipliers"],
@@ -227,6 +248,10 @@ class Program:
         given = [s, z0, z1, totals, *known]
         cost = casadi.densify(casadi.vertcat(*costs)) if costs else SX.zeros(0, 1)
         wanted = casadi.densify(casadi.vertcat(*rows)) if rows else SX.zeros(0, 1)
+        for symbol, equations in start.solved + end.solved:
+            factors = casadi.ldl(casadi.jacobian(equations, symbol))
+            solution = casadi.ldl_solve(-casadi.substitute(equations, symbol, 0), *factors)
+            cost, wanted = casadi.substitute([cost, wanted], [symbol], [solution])
         both = casadi.vertcat(s, z0, z1, totals)
         total, multipliers = casadi.sum1(cost), SX.sym("multipliers", wanted.numel())
         factor = SX.sym("factor")

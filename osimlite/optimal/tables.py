@@ -12,6 +12,7 @@ import numpy as np
 
 from osimlite.errors import DocumentError
 from osimlite.fitting.marker_data import MarkerData
+from osimlite.multibody.constraints import Coupler
 from osimlite.multibody.functions import Function
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.smoothing_spline import SampledCurves
@@ -21,7 +22,12 @@ from osimlite.optimal.layout import FEWEST
 from osimlite.optimal.point import Series
 from osimlite.records import replace
 from osimlite.schema.base import Object
-from osimlite.schema.tools.processors import TableProcessor, TabOpLowPassFilter, TabOpUseAbsoluteStateNames
+from osimlite.schema.tools.processors import (
+    TableProcessor,
+    TabOpAppendCoupledCoordinateValues,
+    TabOpLowPassFilter,
+    TabOpUseAbsoluteStateNames,
+)
 from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.simulation.lowpass import lowpassed
 
@@ -62,6 +68,11 @@ def processed_table(
             table = _filtered(table, operator)
         elif isinstance(operator, TabOpUseAbsoluteStateNames):
             table = replace(table, columns=tuple(_absolute(name, states) for name in table.columns))
+        elif isinstance(operator, TabOpAppendCoupledCoordinateValues):
+            if table.in_degrees:
+                message = "the table is in degrees, of which OpenSim takes functions as if they were radians"
+                raise problem.refused(operator, message)
+            table = _with_coupled(problem, operator, table, mechanism)
         else:
             raise problem.refused(operator, "this operator on tables is not applied here")
     return replace(_in_radians(table, mechanism), header={"inDegrees": "no"})
@@ -92,6 +103,27 @@ def _filtered(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
         own = (times >= table.times[0] - slack) & (times <= table.times[-1] + slack)
         times, rows = times[own], rows[own]
     return replace(table, times=times, rows=rows)
+
+
+def _with_coupled(
+    problem: Asked, operator: TabOpAppendCoupledCoordinateValues, table: StoTable, mechanism: Mechanism
+) -> StoTable:
+    """With the values of coordinates that enforced constraints make functions of others, behind the other columns."""
+    paths = [f"{info.path}/value" for info in mechanism.coordinates]
+    for item in mechanism.constraints:
+        if not isinstance(item, Coupler):
+            continue
+        if paths[item.dependent] in table.columns and not operator.overwrite_existing_columns:
+            continue
+        own = [paths[place] for place in item.independent]
+        for name in own:
+            problem.expect(operator, name, table.columns, "column", whose="the table")
+        given = np.column_stack([table[name] for name in own])
+        kept = [k for k, name in enumerate(table.columns) if name != paths[item.dependent]]
+        values = [item.function.evaluate(row)[0] for row in given]
+        columns = (*(table.columns[k] for k in kept), paths[item.dependent])
+        table = replace(table, columns=columns, rows=np.column_stack([table.rows[:, kept], values]))
+    return table
 
 
 def _absolute(label: str, states: Sequence[str]) -> str:

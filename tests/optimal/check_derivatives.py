@@ -256,6 +256,32 @@ def test_models_with_constraints(scheme, method, derived, mode, tmp_path):
     check(study_of(tied(coupled(model, "q1")), load, **choices), tmp_path)
 
 
+@pytest.mark.parametrize("mode", ["explicit", "implicit"])
+def test_loads_over_time(mode, tmp_path):
+    """Loads are numbers that are renewed for each time, and push as they do where time is a symbol."""
+    tables(tmp_path)
+    model = osimlite.modify(links(), osimlite.ModOpAddExternalLoads(filepath=str(tmp_path / "loads.xml")))
+    sine = osimlite.Sine(amplitude=30.0, omega=4.0, phase=0.2, offset=3.0)
+    push = osimlite.PrescribedForce(name="push", socket_frame=BODIES[0])
+    push.torqueFunctions.objects = [sine.copy_deep() for _ in range(3)]
+    model.add(push)
+    problem = problem_of(study_of(model, osimlite.MocoControlGoal(name="effort"), multibody_dynamics_mode=mode))
+    check(problem, tmp_path)
+    assert len(problem.loads) == 9
+    program = Program(problem)
+    w = np.random.default_rng(0).uniform(0.1, 0.9, len(program.layout.lower))
+    points, count = program.sorts[0], len(problem.functions.states)
+    found = points.at(program, w, problem.grid.places, w[points.columns])
+    f = osimlite.casadi(model)
+    for place, z, values in zip(problem.grid.places, w[points.columns], found, strict=True):
+        t, x, u = w[0] + place * (w[1] - w[0]), z[:count], z[count : count + len(f.controls)]
+        rates = values[:count] / (w[1] - w[0])
+        wanted = np.array(f.dynamics(t, x, u, [])).ravel()
+        if mode == "implicit":
+            wanted, rates = np.array(f.residual(t, x, rates, u, [], []))[2:4].ravel(), values[count:][:2]
+        assert rates == pytest.approx(wanted, rel=1e-11, abs=1e-11)
+
+
 def test_motions_that_are_given(tmp_path):
     tables(tmp_path)
     tool = osimlite.MocoInverse(

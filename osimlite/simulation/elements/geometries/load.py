@@ -25,9 +25,7 @@ def apply_load(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats, t: float) 
     The integers are the links of three frames (where the force acts, along whose axes force and torque are, in which
     the point is), whether there are a force, a point and a torque, and the places of nine tables.
     """
-    for k in range(9):
-        if g[3 + k // 3] > 0:
-            room[k], _, _ = value_at(at(gp, g[6 + k]), t)
+    find_load(g, gp, room, t)
     link = g[0]
     if g[3] > 0:
         turn_vector(s, w, g[1], at(gp, FRAME), room)
@@ -43,6 +41,13 @@ def apply_load(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats, t: float) 
     if g[5] > 0:
         turn_vector(s, w, g[1], at(gp, FRAME), at(room, 6))
         apply_torque(s, w, link, vector(room, 6))
+
+
+def find_load(g: Ints, gp: Floats, room: Floats, t: float) -> None:
+    """Leave what the tables of a load have at a time."""
+    for k in range(9):
+        if g[3 + k // 3] > 0:
+            room[k], _, _ = value_at(at(gp, g[6 + k]), t)
 
 
 def turn_vector(s: Ints, w: Floats, link: int, axes: Floats, turning: Floats) -> None:
