@@ -8,8 +8,7 @@ FOLDER: sources of opensim-core, or its git directory (``git clone --bare``), fo
 Seconds are those of the processor, medians of the rounds. *Set-up and solve* begins with the files, in a process that
 has loaded its libraries and solved another small study; the *process* is a whole one from its start, which solves one.
 Moco uses one thread (``OPENSIM_MOCO_PARALLEL=0``), as we do: more make its processor time larger. The violation is what
-Moco says of each solution file, but of those of MocoInverse: its own largest constraint violation where it is the
-guess, before the first step.
+Moco says of each solution file: its own largest constraint violation where it is the guess, before the first step.
 """
 
 from __future__ import annotations
@@ -182,13 +181,13 @@ def _run(code: str, arguments: list[str], folder: Path) -> tuple[list[float], st
 
 def _violation(folder: Path, solution: str) -> str:
     """The largest one that Moco has of a solution file."""
+    found = MocoTrajectory.read(folder / solution)
     if (folder / "inverse.xml").exists():
-        # There Moco has the forces of constraints among its variables, which are none here.
-        return "-"
-    # Of a guess Moco takes the columns as they come, whatever their names.
-    own, theirs = (MocoTrajectory.read(folder / name) for name in (solution, "theirs.sto"))
-    replace(own, names=theirs.names).write(folder / solution)
-    _, log = _run(THEIRS, [solution, ""], folder)
+        # What MocoInverse adds to its solution is no variable of its study.
+        own = [name for name in found.names["states"] if not name.endswith(("/value", "/speed"))]
+        found = replace(found, names=found.names | {"states": tuple(own)})
+    found.write(folder / "asked.sto")
+    _, log = _run(THEIRS, ["asked.sto", ""], folder)
     (folder / "ipopt.opt").unlink()
     said = re.search(r"Constraint violation\.+:\s+\S+\s+(\S+)", log)
     return f"{float(said[1]):.1e}" if said else "?"
