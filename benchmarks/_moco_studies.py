@@ -20,6 +20,7 @@ from osimlite.simulation.files.trc import write_trc
 
 MOCO = Path(__file__).resolve().parents[2] / "shared/oracle/moco"
 CORE = Path(__file__).resolve().parents[2] / "pub-opensim-core"
+WALKING_3D = "OpenSim/Examples/Moco/example3DWalking"
 WALKING = "OpenSim/Examples/Moco/example2DWalking"
 TESTS = "OpenSim/Moco/Test"
 GAIT = ("subject_walk_armless_18musc.osim", "subject_walk_armless_coordinates.mot",
@@ -157,6 +158,59 @@ def track(intervals: int) -> Callable[[Path, Path], None]:
     return make
 
 
+def walk3d(folder: Path, core: Path) -> None:
+    """3-D walking with 80 muscles that follows measured angles and repeats itself: opensim-core's exampleMocoTrack."""
+    paths = "subject_walk_scaled_FunctionBasedPathSet.xml"
+    names = "subject_walk_scaled.osim", paths, "coordinates.sto", "grf_walk.xml", "grf_walk.mot"
+    sources(core, WALKING_3D, names, folder)
+    model = osimlite.modify(
+        osimlite.read_document(folder / names[0]),
+        osimlite.ModOpReplaceJointsWithWelds(joint_paths=("mtp_r", "mtp_l")),
+        osimlite.ModOpAddExternalLoads(filepath=str(folder / "grf_walk.xml")),
+    )
+    # What ModOpAddResiduals does, which OpenSim 4.6 reads from no file.
+    pelvis: osimlite.CustomJoint = model.find("/jointset/ground_pelvis")
+    weights = []
+    for coordinate in pelvis.coordinates:
+        name = f"residual_jointset_ground_pelvis_{coordinate.name}"
+        force = 50.0 if coordinate.name[-3:] in ("_tx", "_ty", "_tz") else 250.0
+        actuator = osimlite.CoordinateActuator(name=name, coordinate=coordinate.name, optimal_force=force)
+        actuator.min_control, actuator.max_control = -1.0, 1.0
+        model.force_set.objects.append(actuator)
+        weights.append(osimlite.MocoWeight(name=f"/forceset/{name}", weight=10.0))
+    model = osimlite.modify(
+        model,
+        osimlite.ModOpIgnoreTendonCompliance(),
+        osimlite.ModOpReplaceMusclesWithDeGrooteFregly2016(),
+        osimlite.ModOpIgnorePassiveFiberForcesDGF(),
+        osimlite.ModOpScaleActiveFiberForceCurveWidthDGF(scale_factor=1.5),
+        osimlite.ModOpReplacePathsWithFunctionBasedPaths(paths_file=str(folder / paths)),
+    )
+    osimlite.write(model, folder / "model.osim")
+    tool = osimlite.MocoTrack(
+        name="walk",
+        model=osimlite.ModelProcessor(filepath="model.osim"),
+        states_reference=osimlite.TableProcessor(filepath="coordinates.sto"),
+        allow_unused_references=True,
+        track_reference_position_derivatives=True,
+        initial_time=0.48,
+        final_time=1.61,
+        mesh_interval=0.02,
+        control_effort_weight=0.1,
+        controls_weight_set=osimlite.MocoWeightSet(name="controls_weight_set", objects=weights),
+    )
+    osimlite.write(tool, folder / "track.xml")
+    functions = osimlite.casadi(model, folder=folder)
+    repeats = osimlite.MocoPeriodicityGoal(name="periodicity")
+    for pairs, known in ((repeats.state_pairs, functions.states), (repeats.control_pairs, functions.controls)):
+        pairs += [osimlite.MocoPeriodicityGoalPair(initial_variable=name) for name in known if "_tx/value" not in name]
+    more = osimlite.MocoProblem(name="problem", phases=osimlite.MocoPhase(name="phases", goals=[repeats]))
+    solver = osimlite.MocoCasADiSolver(
+        optim_convergence_tolerance=1e-3, optim_constraint_tolerance=1e-4, optim_max_iterations=1000
+    )
+    osimlite.write(osimlite.MocoStudy(name="more", problem=more, solver=solver), folder / "more.omoco")
+
+
 def predict(intervals: int) -> Callable[[Path, Path], None]:
     """2-D walking with little effort, from Moco's solution of the one above."""
 
@@ -231,3 +285,5 @@ STUDIES: dict[str, Callable[[Path, Path], None]] = {
     "walking": track(25),
     "predicted": predict(10),
 }
+LONG = {"walking 3d": walk3d}
+"""Those that Moco takes most of an hour for."""

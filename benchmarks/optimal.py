@@ -9,6 +9,7 @@ Seconds are those of the processor, medians of the rounds. *Set-up and solve* be
 has loaded its libraries and solved another small study; the *process* is a whole one from its start, which solves one.
 Moco uses one thread (``OPENSIM_MOCO_PARALLEL=0``), as we do: more make its processor time larger. The violation is what
 Moco says of each solution file: its own largest constraint violation where it is the guess, before the first step.
+Studies that Moco takes most of an hour for are solved here alone, and only by name.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from pathlib import Path
 from statistics import median
 
 import osimlite
-from _moco_studies import CORE, STUDIES, kept
+from _moco_studies import CORE, LONG, STUDIES, kept
 from osimlite.moco import MocoTrajectory
 from osimlite.records import replace
 
@@ -116,7 +117,7 @@ def main(names: list[str], core: Path, rounds: int) -> None:
         for name in names or STUDIES:
             folder = Path(place) / name.replace(" ", "_")
             folder.mkdir()
-            STUDIES[name](folder, core)
+            (STUDIES | LONG)[name](folder, core)
             _say_more(folder)
             _study(name, folder, str(warm), rounds)
 
@@ -136,6 +137,8 @@ def _say_more(folder: Path) -> None:
 def _study(name: str, folder: Path, warm: str, rounds: int) -> None:
     """Solve one in turn, and print its rows."""
     sides = {"Moco": (THEIRS, ""), "as Moco": (OURS, ""), "exact": (OURS, "exact")}
+    if name in LONG:
+        sides = {"as Moco": sides["as Moco"]}
     spent: dict[str, list[float]] = {side: [] for side in sides}
     whole: dict[str, list[float]] = {side: [] for side in sides}
     said: dict[str, list[float]] = {}
@@ -152,14 +155,14 @@ def _study(name: str, folder: Path, warm: str, rounds: int) -> None:
                 whole[side].append(cold[0] + said[side][3])
             else:
                 whole[side].append(_run(code, [choice, ""], folder)[0][4])
-            missed[side] = _violation(folder, "theirs.sto" if side == "Moco" else "ours.sto")
+            missed[side] = "-" if name in LONG else _violation(folder, "theirs.sto" if side == "Moco" else "ours.sto")
     for number, side in enumerate(sides):
         success, iterations, objective, *_ = said[side]
         note = "" if success else " (not solved)"
         cells = ["" if number else name, side + note, f"{iterations}", f"{objective:.7g}", missed[side]]
         for kind in (spent, whole):
             own = median(kind[side])
-            cells += [f"{own:.3g}", f"{median(kind['Moco']) / own:.1f}" if number else ""]
+            cells += [f"{own:.3g}", "" if side == "Moco" or name in LONG else f"{median(kind['Moco']) / own:.1f}"]
         print("|", *(f"{cell} |" for cell in cells), flush=True)
 
 
@@ -195,7 +198,7 @@ def _violation(folder: Path, solution: str) -> str:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("studies", nargs="*", choices=[[], *STUDIES], default=[])
+    parser.add_argument("studies", nargs="*", choices=[[], *STUDIES, *LONG], default=[])
     parser.add_argument("--core", type=Path, default=CORE)
     parser.add_argument("--rounds", type=int, default=1)
     chosen = parser.parse_args()
