@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from array import array
 from collections.abc import Iterable, Sequence
 from functools import cached_property
-from itertools import combinations, pairwise, product
+from itertools import chain, combinations, pairwise, product
 from typing import TYPE_CHECKING, Any
 
 from osimlite.errors import ModelError
@@ -338,7 +338,7 @@ def _pieces(knots: Sequence[float], pieces: Sequence[Sequence[float]]) -> list[f
     """The table of the polynomials after each knot, from the constant up; the first one goes on before its knot."""
     width = max(map(len, pieces))
     rows = [(*piece, *[0.0] * (width - len(piece))) for piece in pieces]
-    return [PIECES, 1.0, float(len(knots)), float(width), *knots, *(x for row in rows for x in row)]
+    return [PIECES, 1.0, float(len(knots)), float(width), *knots, *chain.from_iterable(rows)]
 
 
 def table_at_knots(function: Function) -> list[float]:

@@ -12,6 +12,7 @@ from osimlite.schema.references import OwnJointCoordinates
 from osimlite.schema.specs import FieldSpec
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+_AXES = "rotation1", "rotation2", "rotation3", "translation1", "translation2", "translation3"
 
 
 class TransformAxis(Object):
@@ -62,7 +63,7 @@ class SpatialTransform(Object):
 
     def axes(self) -> dict[str, TransformAxis]:
         """The axes by the names of their places, in order."""
-        return {name: getattr(self, name) for name in type(self).model_fields if name[-1:] in "123"}
+        return {name: getattr(self, name) for name in _AXES}
 
 
 class CustomJoint(Joint):
