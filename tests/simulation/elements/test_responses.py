@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from osimlite.kernels import pointers
-from osimlite.kernels.condensation import INVERSE, OF_ITEM, WIDTH
+from osimlite.kernels import layout, pointers
+from osimlite.kernels.condensation import INVERSE, WIDTH
 from osimlite.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.multibody import build_mechanism
 from osimlite.simulation import Simulation
@@ -103,6 +103,6 @@ def responses(system: System, y: np.ndarray) -> dict[str, np.ndarray]:
         kernel = system.program.code.bound(name, s, system.numbers, system._w, y, np.zeros(len(y)))
         if isinstance(system.program.code, Checked):
             kernel = partial(pointers.call, int(s[place]), s, system.numbers, system._w, y, np.zeros(len(y)))
-        assert kernel(int(s[place + OF_ITEM])) == OUTCOME.OK
+        assert kernel(int(s[place + layout.RESPONSE.ITEM])) == OUTCOME.OK
         result[name] = np.array(system._w[WORK.SCRATCH : WORK.SCRATCH + INVERSE])
     return result
