@@ -100,14 +100,15 @@ def _derivative(x: Sequence[float], u: float) -> float:
 
 
 def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
-    """y and the slope of a curve."""
+    """y and the slope of a curve; where x carries derivatives, y does, by the slope."""
     if not x >= c[FIRST]:
         return c[FIRST + 1] + c[FIRST + 2] * (x - c[FIRST]), c[FIRST + 2]
     if x > c[LAST]:
         return c[LAST + 1] + c[LAST + 2] * (x - c[LAST]), c[LAST + 2]
-    k, rest, u = first_place(c, x)
+    known = plain(x)
+    k, rest, u = first_place(c, known)
     _, _, y, slope = on_section(c, k + X, 1, u, rest, ROUNDS)
-    return y, slope
+    return settled(y, slope * (known - x), 1.0), slope
 
 
 def first_place(c: Sequence[float], x: float) -> tuple[int, float, float]:
@@ -131,8 +132,6 @@ def on_section(
 ) -> tuple[float, bool, float, float]:
     """u after some steps of Halley's search for the only root, whether more are wanted, and y and the slope there.
 
-    If numbers carry derivatives, the slope carries none.
-
     Args:
         c: where the coefficients of x and y are.
         p: place of the first of these.
@@ -141,21 +140,18 @@ def on_section(
         rest: how far x is from the start of the section.
         rounds: steps at most.
     """
-    u, known, goes_on = plain(u), plain(rest), True
+    goes_on = True
     for _ in range(rounds):
-        u, goes_on = nearer_place(c, p, apart, u, known)
+        u, goes_on = nearer_place(c, p, apart, u, rest)
         if not goes_on:
             break
-    off, run = missed(c, p, apart, u, rest)
     y, slope = value_at(c, p, apart, u)
-    slope = plain(slope)
-    return settled(u, off, run), goes_on, settled(y, slope * off, 1.0), slope
+    return u, goes_on, y, slope
 
 
 def nearer_place(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> tuple[float, bool]:
-    """u after a step, and whether more are wanted; the arguments are those of `on_section`, without derivatives."""
-    a, b, d = plain(c[p]), plain(c[p + apart]), plain(c[p + 2 * apart])
-    e, f = plain(c[p + 3 * apart]), plain(c[p + 4 * apart])
+    """u after a step, and whether more are wanted; the arguments are those of `on_section`."""
+    a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
     # In halves, which a processor computes side by side.
     v = u * u
     off = u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
@@ -178,12 +174,11 @@ def value_at(c: Sequence[float], p: int, apart: int, u: float) -> tuple[float, f
     return (g + u * h) + v * ((i + u * j) + v * (k + u * m)), rise / run
 
 
-def missed(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> tuple[float, float]:
-    """How far u is from the root, and the derivative of that; the arguments are those of `on_section`."""
+def missed(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> float:
+    """How far u is from the root; the arguments are those of `on_section`."""
     a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
     v = u * u
-    run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
-    return u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest, run
+    return u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
 
 
 def value_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tuple[float, float]:
@@ -195,24 +190,22 @@ def value_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> 
     if end > 0:
         return beyond_sum(c, of_y, of_x, total, end), total - total
     k, rest, u = first_place_of_sum(c, of_y, of_x, total)
-    # As numbers of one kind in a row, which on_section takes.
-    zero = 0.0 * total
+    # As numbers in a row, which on_section takes.
     own = (
         of_y * c[k + Y + 1] + of_x * c[k + X],
         of_y * c[k + Y + 2] + of_x * c[k + X + 1],
         of_y * c[k + Y + 3] + of_x * c[k + X + 2],
         of_y * c[k + Y + 4] + of_x * c[k + X + 3],
         of_y * c[k + Y + 5] + of_x * c[k + X + 4],
-        c[k + Y] + zero,
-        c[k + Y + 1] + zero,
-        c[k + Y + 2] + zero,
-        c[k + Y + 3] + zero,
-        c[k + Y + 4] + zero,
-        c[k + Y + 5] + zero,
+        c[k + Y],
+        c[k + Y + 1],
+        c[k + Y + 2],
+        c[k + Y + 3],
+        c[k + Y + 4],
+        c[k + Y + 5],
     )
     u, _, y, _ = on_section(own, 0, 1, u, rest, ROUNDS)
-    off, _ = missed(own, 0, 1, u, rest)
-    return y, off
+    return y, missed(own, 0, 1, u, rest)
 
 
 def end_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> int:

@@ -74,8 +74,7 @@ def ask_sum(x: Floats, room: Floats, number: int, place: int, of_y: float, of_x:
 
 def missed_of(room: Any, number: int) -> float:
     """How far a search has ended from where it was to."""
-    off, _ = missed(room, LANES * OF_X + number, LANES, room[LANES * U + number], room[LANES * REST + number])
-    return off
+    return missed(room, LANES * OF_X + number, LANES, room[LANES * U + number], room[LANES * REST + number])
 
 
 def value_of(room: Floats, number: int) -> float:
