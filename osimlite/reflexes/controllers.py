@@ -292,7 +292,12 @@ class Reflexes:
         target, number, before = self._begin(node, prefix, leg, symmetric, kind)
         delay = self._delay(node, parameters, before)
         gate = self._gate(node, parameters, before, leg) if name == CONDITIONAL else -1
+        written = {key for key, _ in node.parts}
         for letter, feel, rest, is_free in kind.channels:
+            keys = {f"K{letter}", f"{letter}0", *(() if is_free is None else (f"allow_neg_{letter}",))}
+            node.asked |= keys
+            if written.isdisjoint(keys):
+                continue
             settings = (f"{letter}0", rest), (f"K{letter}", 0.0)
             found = {
                 key: parameters.of(node, key, value, before + key)
@@ -335,10 +340,11 @@ class Reflexes:
         numbers = np.column_stack([self._limits, *(column for columns in each for column in columns)])
         felt = (np.max(delay) for part, delay in zip(parts, delays, strict=True) if part.ints[TERM.SENSOR] >= 0)
         kept = int(np.ceil(max([*felt, self._limits[0, LIMITS.DELAY]]))) + 2
-        ints = [number for part in parts for number in part.ints]
+        ints, more = [number for part in parts for number in part.ints], list[float]()
         for source in self.sources:
-            ints += source.kind, source.place, numbers.shape[1] if source.numbers else source.more
-            numbers = np.column_stack([numbers, *(np.full(len(numbers), x) for x in source.numbers)])
+            ints += source.kind, source.place, numbers.shape[1] + len(more) if source.numbers else source.more
+            more += source.numbers
+        numbers = np.column_stack([numbers, np.tile(more, (len(numbers), 1))])
         head, sensors = np.zeros(REFLEXES.HEAD, dtype=np.int64), len(self.sources)
         head[: REFLEXES.ROOM + 1] = (
             *(len(self.terms), len(self._gates), kept, sensors, self._has_states, self._swings_from_stance),
