@@ -83,24 +83,24 @@ def dynamics_with(equations: Sequence[int]) -> Law:
     As in `by_multipliers`: the tree's own factor of the mass matrix gives what each equation's force does.
     """
 
-    def law(s: Vector, x: Vector, w: Vector, y: Vector, f: Vector, unused: int) -> int:
-        h, size = s.rest(s[MODEL.CONSTRAINED]), s[MODEL.DOFS]
-        right, freedoms = f.rest(size), s.rest(s[MODEL.DOF_AT])
-        on_symbols(bind)(s, x, w, y, f)
-        on_symbols(solve)(s, w, right)
-        inverse = [1.0 / w[freedoms[DOF.SIZE * k + DOF.ROW]] for k in range(size)]
+    def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector, unused: int) -> int:
+        h, size = model.rest(model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
+        right, freedoms = f.rest(size), model.rest(model[MODEL.DOF_AT])
+        on_symbols(bind)(model, reals, data, y, f)
+        on_symbols(solve)(model, data, right)
+        inverse = [1.0 / data[freedoms[DOF.SIZE * k + DOF.ROW]] for k in range(size)]
         rows, missing = [], []
         for number in equations:
-            row = [w[h[CONSTRAINED.WORK_ROWS] + size * number + k] for k in range(size)]
-            missing.append(w[h[CONSTRAINED.WORK_DRIFTS] + number] - sum(a * right[k] for k, a in enumerate(row)))
+            row = [data[h[CONSTRAINED.WORK_ROWS] + size * number + k] for k in range(size)]
+            missing.append(data[h[CONSTRAINED.WORK_DRIFTS] + number] - sum(a * right[k] for k, a in enumerate(row)))
             turned = Vector(row)
-            on_symbols(toward_ground)(s, w, turned)
+            on_symbols(toward_ground)(model, data, turned)
             rows.append(casadi.horzcat(*turned.cells))
         g = casadi.sparsify(casadi.SX(casadi.vertcat(*rows)))
         scaled = g @ casadi.diag(casadi.vertcat(*inverse))
         multipliers = casadi.ldl_solve(casadi.SX(casadi.vertcat(*missing)), *casadi.ldl(scaled @ g.T))
         push = Vector(casadi.vertsplit(casadi.densify(scaled.T @ multipliers)))
-        on_symbols(away_from_ground)(s, w, push)
+        on_symbols(away_from_ground)(model, data, push)
         for k in range(size):
             right[k] += push[k]
         return OUTCOME.OK

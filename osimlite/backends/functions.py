@@ -288,22 +288,22 @@ class CasadiModel(StatedModel):
             empty = self._library.SX(0, size)
             return {"position": nothing, "velocity": nothing, "acceleration": nothing, "jacobian": empty}
         found, structure = self._traced.bound(), self._traced.structure
-        h, w = structure[structure[MODEL.CONSTRAINED] :], found.w
+        h, data = structure[structure[MODEL.CONSTRAINED] :], found.data
         order = [self._places.index(k) for k in range(size)]
         rows = []
         for number in range(count):
             first = h[CONSTRAINED.WORK_ROWS] + size * number
             row = [0.0] * size
             for k, place in enumerate(order):
-                row[place] = w[first + k]
+                row[place] = data[first + k]
             rows.append(self._library.horzcat(*row))
         jacobian = self._library.sparsify(self._library.SX(column(*rows)))
         u, udot = self._symbols["x"][size : 2 * size], self._symbols["xdot"][size : 2 * size]
 
         def wanted(place: int) -> Any:
-            return column(*w[h[place] : h[place] + count])
+            return column(*data[h[place] : h[place] + count])
 
-        errors = [w[h[CONSTRAINED.WORK_ERRORS] + number] for number in position_equations(structure)]
+        errors = [data[h[CONSTRAINED.WORK_ERRORS] + number] for number in position_equations(structure)]
         return {
             "position": self._library.SX(column(*errors)),
             "velocity": jacobian @ u - wanted(CONSTRAINED.WORK_RATES),

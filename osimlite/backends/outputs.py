@@ -59,12 +59,12 @@ def frame_columns(found: Evaluated, frames: Sequence[tuple[int, Sequence[Any]]])
 
     columns: list[list[Any]] = [[], [], [], []]
     for link, numbers in frames:
-        origin = found.on(station)(found.s, found.w, link, tuple(numbers[9:]))
+        origin = found.on(station)(found.model, found.data, link, tuple(numbers[9:]))
         columns[0] += origin
         for axis in range(3):
-            columns[1] += found.on(direction)(found.s, found.w, link, tuple(numbers[3 * axis : 3 * axis + 3]))
-        columns[2] += found.on(velocity)(found.s, found.w, link, origin)
-        columns[3] += found.on(angular_velocity)(found.s, found.w, link)
+            columns[1] += found.on(direction)(found.model, found.data, link, tuple(numbers[3 * axis : 3 * axis + 3]))
+        columns[2] += found.on(velocity)(found.model, found.data, link, origin)
+        columns[3] += found.on(angular_velocity)(found.model, found.data, link)
     names = "position", "rotation", "velocity", "angular_velocity"
     sizes = 3, 9, 3, 3
     return {
@@ -91,19 +91,19 @@ def output_columns(
     speeds: list[Any] = []
     for number, (path, link, _) in enumerate(station_places(mechanism, packed)):
         labels += [f"{path}|{axis}" for axis in AXES]
-        point = at_station(found.s, found.w, link, tuple(points[3 * number : 3 * number + 3]))
+        point = at_station(found.model, found.data, link, tuple(points[3 * number : 3 * number + 3]))
         places += point
-        speeds += speed_of(found.s, found.w, link, point)
+        speeds += speed_of(found.model, found.data, link, point)
     center, rate = _mass_center(mechanism, packed, found)
     pushed = _contacts(packed, forces, found)
     known = [
-        (f"{element.path}|{name}", found.w[items[-1][0] + place])
+        (f"{element.path}|{name}", found.data[items[-1][0] + place])
         for element, items in zip(forces.elements, packed.items, strict=True)
         if isinstance(element, DeclaredForce) and items
         for name, place in element.kind.recorded.items()
     ]
     probed = [
-        (f"{probe.path}|{label}", probe.gain * found.w[items[-1][0] + place])
+        (f"{probe.path}|{label}", probe.gain * found.data[items[-1][0] + place])
         for probe, items in zip(forces.elements, packed.items, strict=True)
         if isinstance(probe, DeclaredProbe)
         for place, label in enumerate(probe.reading.labels)
@@ -124,15 +124,15 @@ def _mass_center(mechanism: Mechanism, packed: Packed, found: Found) -> tuple[li
     parts = []
     for link in range(int(packed.structure[MODEL.LINKS])):
         first = INERTIA_AT + INERTIA.SIZE * link
-        parts.append((found.x[first], link, tuple(found.x[first + INERTIA.CENTER : first + INERTIA.MOMENTS])))
+        parts.append((found.reals[first], link, tuple(found.reals[first + INERTIA.CENTER : first + INERTIA.MOMENTS])))
     for placement, body in zip(packed.placements, mechanism.bodies, strict=True):
         if placement.link == GROUND:
             own, frame = body.mass_properties, placement.frame
             parts.append((own.mass, GROUND, tuple((frame[:3, :3] @ own.center + frame[:3, 3]).tolist())))
     total, center, rate = 0.0, [0.0] * 3, [0.0] * 3
     for mass, link, point in parts:
-        place = found.on(station)(found.s, found.w, link, point)
-        moves = found.on(velocity)(found.s, found.w, link, place)
+        place = found.on(station)(found.model, found.data, link, point)
+        moves = found.on(velocity)(found.model, found.data, link, place)
         total = total + mass
         center = [a + mass * b for a, b in zip(center, place, strict=True)]
         rate = [a + mass * b for a, b in zip(rate, moves, strict=True)]
@@ -151,7 +151,7 @@ def _contacts(packed: Packed, forces: Forces, found: Found) -> list[tuple[str, A
         elif isinstance(element, DeclaredForce) and element.kind.geometry is SPHERE_ON_PLANE and items:
             pairs.append((element.path, items[-1][0] + len(element.kind.recorded)))
     return [
-        (f"{name}|{what}_{axis}", found.w[place + 3 * part + k])
+        (f"{name}|{what}_{axis}", found.data[place + 3 * part + k])
         for name, place in pairs
         for part, what in enumerate(("force", "point"))
         for k, axis in enumerate(AXES)
@@ -165,8 +165,8 @@ def path_entries(packed: Packed, forces: Forces, found: Evaluated) -> tuple[list
         if isinstance(element, DeclaredForce) and element.kind.geometry is PATH and len(items) > 1:
             record = items[-2][0]
             names.append(element.path)
-            lengths.append(found.w[record + LENGTH])
-            speeds.append(found.w[record + SPEED])
+            lengths.append(found.data[record + LENGTH])
+            speeds.append(found.data[record + SPEED])
     return names, found.sure(lengths), found.sure(speeds)
 
 
@@ -189,17 +189,17 @@ def joint_load_columns(
     from osimlite.backends.symbols import casadi
 
     beyond = {link}
-    for later in range(link + 1, found.s[MODEL.LINKS]):
-        if found.on(link_ints)(found.s, later)[LINK.PARENT] in beyond:
+    for later in range(link + 1, found.model[MODEL.LINKS]):
+        if found.on(link_ints)(found.model, later)[LINK.PARENT] in beyond:
             beyond.add(later)
-    first = found.s[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
-    wrench = casadi.vertcat(*found.w[first + LINK_WORK.WRENCH : first + LINK_WORK.WRENCH + 6])
+    first = found.model[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
+    wrench = casadi.vertcat(*found.data[first + LINK_WORK.WRENCH : first + LINK_WORK.WRENCH + 6])
     for of, multiplier, unit in pushes:
         if of in beyond:
             wrench -= multiplier * casadi.vertcat(*unit)
     wrench *= -sign
-    place = found.on(station)(found.s, found.w, origin[0], tuple(origin[1]))
-    start = found.w[first + LINK_WORK.ORIGIN : first + LINK_WORK.ORIGIN + 3]
+    place = found.on(station)(found.model, found.data, origin[0], tuple(origin[1]))
+    start = found.data[first + LINK_WORK.ORIGIN : first + LINK_WORK.ORIGIN + 3]
     arm = casadi.vertcat(*place) - casadi.vertcat(*start)
     moment = wrench[:3] - casadi.cross(arm, wrench[3:])
     return {"force": found.sure([wrench[3:]]), "moment": found.sure([moment])}

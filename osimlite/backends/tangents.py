@@ -268,15 +268,15 @@ class Seen:
     """What an evaluation has left, as numbers that carry derivatives.
 
     Args:
-        s: the structure.
-        x: the numbers (k, 1 + DIRECTIONS).
-        w: the work vector (k, 1 + DIRECTIONS).
+        model: the structure.
+        reals: the numbers (k, 1 + DIRECTIONS).
+        data: the work vector (k, 1 + DIRECTIONS).
     """
 
     on = staticmethod(carried_by)
 
-    def __init__(self, s: Any, x: Array, w: Array) -> None:
-        self.s, self.x, self.w = s, Rows(x), Rows(w)
+    def __init__(self, model: Any, reals: Array, data: Array) -> None:
+        self.model, self.reals, self.data = model, Rows(reals), Rows(data)
 
     def sure(self, numbers: Sequence[Any]) -> list[Any]:
         """Numbers as they are: where the evaluation fails, nobody looks."""

@@ -93,16 +93,16 @@ class Traced:
 
     def evaluated(self, stage: int) -> Evaluated:
         """All that `evaluate` finds up to a stage."""
-        return self.run(lambda s, x, w, y, f: on_symbols(evaluate)(s, x, w, y, f, stage))
+        return self.run(lambda model, reals, data, y, f: on_symbols(evaluate)(model, reals, data, y, f, stage))
 
     def probed(self) -> Evaluated:
         """All that `evaluate` finds, and after it what the probes do."""
         places = probe_places(self._packed, self._elements)
 
-        def law(s: Vector, x: Vector, w: Vector, y: Vector, f: Vector) -> None:
-            on_symbols(evaluate)(s, x, w, y, f, STAGE.ACCELERATION)
+        def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector) -> None:
+            on_symbols(evaluate)(model, reals, data, y, f, STAGE.ACCELERATION)
             for place in places:
-                on_symbols(call)(s[place + ITEM.LAW], s, x, w, y, f, place)
+                on_symbols(call)(model[place + ITEM.LAW], model, reals, data, y, f, place)
 
         return self.run(law)
 
@@ -117,10 +117,10 @@ class Traced:
             structure[MODEL.RUNS], structure[run + RUN.LAW] = 1, 0
             structure[run + RUN.FIRST], structure[run + RUN.END] = 0, len(items)
 
-        def law(s: Vector, x: Vector, w: Vector, y: Vector, f: Vector) -> None:
+        def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector) -> None:
             for k in range(size):
                 f[size + k] = udot[k]
-            on_symbols(inverse)(s, x, w, y, f, 0)
+            on_symbols(inverse)(model, reals, data, y, f, 0)
 
         return self.run(law, structure)
 
@@ -129,19 +129,19 @@ class Traced:
         first = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS]
         size = self.structure[MODEL.DOFS]
 
-        def law(s: Vector, x: Vector, w: Vector, y: Vector, f: Vector) -> dict[tuple[int, int], list[Any]]:
+        def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector) -> dict[tuple[int, int], list[Any]]:
             wrenches: dict[tuple[int, int], list[Any]] = {}
             kernel = on_symbols(add_wrench)
 
-            def add(s: Vector, w: Vector, link: int, torque: Any, force: Any, row: Vector) -> None:
+            def add(model: Vector, data: Vector, link: int, torque: Any, force: Any, row: Vector) -> None:
                 key = (row.first - first) // size, link
                 before = wrenches.get(key, [0.0] * 6)
                 wrenches[key] = [old + new for old, new in zip(before, (*torque, *force), strict=True)]
-                kernel(s, w, link, torque, force, row)
+                kernel(model, data, link, torque, force, row)
 
-            on_symbols(evaluate)(s, x, w, y, f, STAGE.VELOCITY)
+            on_symbols(evaluate)(model, reals, data, y, f, STAGE.VELOCITY)
             with standing_in(add_wrench, add):
-                on_symbols(bind)(s, x, w, y, f)
+                on_symbols(bind)(model, reals, data, y, f)
             return wrenches
 
         return self.run(law)
@@ -152,15 +152,15 @@ class Traced:
         """What a function of the five vectors leaves."""
 
         def run() -> Evaluated:
-            s, x = Vector(self.structure if structure is None else structure), Vector(list(self.numbers))
-            w, y = Vector([0.0] * self.structure[MODEL.WORK_SIZE]), Vector(list(self._y))
+            model, reals = Vector(self.structure if structure is None else structure), Vector(list(self.numbers))
+            data, y = Vector([0.0] * self.structure[MODEL.WORK_SIZE]), Vector(list(self._y))
             f = Vector([0.0] * len(self._y))
-            w[WORK.TIME] = self._t
+            data[WORK.TIME] = self._t
             for k, control in enumerate(self._controls):
-                w[self.structure[MODEL.WORK_CONTROL] + k] = control
+                data[self.structure[MODEL.WORK_CONTROL] + k] = control
             with standing_in(find_load, self._find_load) if self._loads else nullcontext():
-                result = law(s, x, w, y, f)
-            return Evaluated(s, x, w, f, result, ways.run.failures)
+                result = law(model, reals, data, y, f)
+            return Evaluated(model, reals, data, f, result, ways.run.failures)
 
         try:
             return ways.repeated(run)
@@ -192,16 +192,18 @@ class Evaluated:
     """What an evaluation has left.
 
     Args:
-        s: the structure.
-        x: the numbers.
-        w: the work vector.
+        model: the structure.
+        reals: the numbers.
+        data: the work vector.
         f: derivative of the state, or what stands in its place.
         result: what the function returned.
         failures: where one of these holds, there is no result.
     """
 
-    def __init__(self, s: Vector, x: Vector, w: Vector, f: Vector, result: Any, failures: Sequence[Any]) -> None:
-        self.s, self.x, self.w, self.f, self.result = s, x, w, f, result
+    def __init__(
+        self, model: Vector, reals: Vector, data: Vector, f: Vector, result: Any, failures: Sequence[Any]
+    ) -> None:
+        self.model, self.reals, self.data, self.f, self.result = model, reals, data, f, result
         self.on, self._failed = on_symbols, reduce(casadi.logic_or, failures) if failures else None
 
     def sure(self, numbers: Sequence[Any]) -> Any:

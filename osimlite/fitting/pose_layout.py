@@ -162,13 +162,13 @@ class FitLayout:
             yield link
 
     @staticmethod
-    def _axes(ints: list[int], s: Ints, numbers: Floats, links: int) -> None:
+    def _axes(ints: list[int], model: Ints, numbers: Floats, links: int) -> None:
         """The axes of each link, in the order in which they carry one another."""
         first, axes, balls = [0], list[tuple[int, int]](), list[int]()
         for link in range(links):
-            record = s[s[MODEL.LINK_AT] + LINK.SIZE * link :]
+            record = model[model[MODEL.LINK_AT] + LINK.SIZE * link :]
             for operation in range(record[LINK.FIRST_OPERATION], record[LINK.END_OPERATION]):
-                j = s[s[MODEL.OPERATION_AT] + OPERATION.SIZE * operation :]
+                j = model[model[MODEL.OPERATION_AT] + OPERATION.SIZE * operation :]
                 parts = [-1]
                 if j[OPERATION.MOTION] in (MOTION.BALL, MOTION.BALL_BACK):
                     balls.append(int(j[OPERATION.ARGUMENTS]))

@@ -14,20 +14,20 @@ SIGN, COORDINATES, TURNS = 0, 1, 3
 joint, and the operations that are the three turns, -1 for what does not move."""
 
 
-def place_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
+def place_drift(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Nothing moves."""
-    kept, frame = operation_work(s, w, operation), at(w, WORK.SCRATCH)
+    kept, frame = operation_work(model, data, operation), at(data, WORK.SCRATCH)
     copy(12, frame, kept)
     return OUTCOME.OK
 
 
-def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
+def move_drift(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Velocity and own acceleration in SCRATCH; what turns the joint forwards stays in the operation."""
-    own = at(s, operation_ints(s, operation)[OPERATION.ARGUMENTS])
+    own = at(model, operation_ints(model, operation)[OPERATION.ARGUMENTS])
     kept, result, u = (
-        operation_work(s, w, operation),
-        at(w, WORK.SCRATCH),
-        at(y, s[MODEL.DOFS]),
+        operation_work(model, data, operation),
+        at(data, WORK.SCRATCH),
+        at(y, model[MODEL.DOFS]),
     )
     arm, total = minus(vector(kept, OPERATION_WORK.POINT), vector(result, 0)), ZERO
     for row in range(1, 3):
@@ -44,12 +44,12 @@ def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
             for c in range(row):
                 freedom = own[COORDINATES + c]
                 if freedom >= 0:
-                    wrong += share(s, w, number, freedom) * u[freedom]
+                    wrong += share(model, data, number, freedom) * u[freedom]
             if turn < row:
-                wrong -= rate(s, w, u, number)
-            drift = along(drift, wrong, vector(operation_work(s, w, number), OPERATION_WORK.AXIS))
-        axis = vector(operation_work(s, w, last), OPERATION_WORK.AXIS)
-        total = along(total, -rate(s, w, u, last), cross(axis, drift))
+                wrong -= rate(model, data, u, number)
+            drift = along(drift, wrong, vector(operation_work(model, data, number), OPERATION_WORK.AXIS))
+        axis = vector(operation_work(model, data, last), OPERATION_WORK.AXIS)
+        total = along(total, -rate(model, data, u, last), cross(axis, drift))
     kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE], kept[OPERATION_WORK.CURVATURE] = total
     total = times(float(own[SIGN]), total)
     set_row(result, ZERO, ZERO)
@@ -57,18 +57,18 @@ def move_drift(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
     return OUTCOME.OK
 
 
-def rate(s: Ints, w: Floats, u: Floats, operation: int) -> float:
+def rate(model: Ints, data: Floats, u: Floats, operation: int) -> float:
     """Of the amount of an operation."""
-    freedom = operation_ints(s, operation)[OPERATION.DOF]
-    return u[freedom] if freedom >= 0 else operation_work(s, w, operation)[OPERATION_WORK.RATE]
+    freedom = operation_ints(model, operation)[OPERATION.DOF]
+    return u[freedom] if freedom >= 0 else operation_work(model, data, operation)[OPERATION_WORK.RATE]
 
 
-def share(s: Ints, w: Floats, operation: int, freedom: int) -> float:
+def share(model: Ints, data: Floats, operation: int, freedom: int) -> float:
     """Derivative of the amount of an operation by a degree of freedom."""
-    j, total = operation_ints(s, operation), 0.0
+    j, total = operation_ints(model, operation), 0.0
     if j[OPERATION.DOF] >= 0:
         return 1.0 if j[OPERATION.DOF] == freedom else 0.0
     for k in range(j[OPERATION.ARGUMENT_COUNT]):
-        if s[j[OPERATION.ARGUMENTS] + k] == freedom:
-            total += w[j[OPERATION.GRADIENT] + k]
+        if model[j[OPERATION.ARGUMENTS] + k] == freedom:
+            total += data[j[OPERATION.GRADIENT] + k]
     return total

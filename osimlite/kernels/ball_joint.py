@@ -25,15 +25,15 @@ from osimlite.kernels.states import copy
 from osimlite.kernels.trigonometry import sine_cosine
 
 
-def place_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
+def place_ball(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Pass the frame in SCRATCH on by the motion."""
-    j = operation_ints(s, operation)
+    j = operation_ints(model, operation)
     kept, frame, radii = (
-        operation_work(s, w, operation),
-        at(w, WORK.SCRATCH),
-        at(x, j[OPERATION.EXTRA]),
+        operation_work(model, data, operation),
+        at(data, WORK.SCRATCH),
+        at(reals, j[OPERATION.EXTRA]),
     )
-    angles = at(s, j[OPERATION.ARGUMENTS])
+    angles = at(model, j[OPERATION.ARGUMENTS])
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
     s3, c3 = sine_cosine(y[angles[2]])
@@ -49,15 +49,15 @@ def place_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: i
     return OUTCOME.OK
 
 
-def move_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
+def move_ball(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Columns of the three speeds, rates of the angles; velocity and own acceleration in SCRATCH."""
-    j = operation_ints(s, operation)
+    j = operation_ints(model, operation)
     kept, result, radii = (
-        operation_work(s, w, operation),
-        at(w, WORK.SCRATCH),
-        at(x, j[OPERATION.EXTRA]),
+        operation_work(model, data, operation),
+        at(data, WORK.SCRATCH),
+        at(reals, j[OPERATION.EXTRA]),
     )
-    angles, u = at(s, j[OPERATION.ARGUMENTS]), at(y, s[MODEL.DOFS])
+    angles, u = at(model, j[OPERATION.ARGUMENTS]), at(y, model[MODEL.DOFS])
     sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
     n, far = last_axis(y, angles), vector(radii, 0)
     arm, spin = minus(vector(kept, OPERATION_WORK.POINT), vector(result, 0)), (u[angles[0]], u[angles[1]], u[angles[2]])
@@ -66,7 +66,7 @@ def move_ball(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: in
         axis = replaced(ZERO, k, 1.0)
         e = times(sign, turned(kept, axis))
         m = plus(times(sign, turned(kept, left_behind(far, axis, n))), cross(arm, e))
-        add_row(at(w, s[MODEL.WORK_COLUMN] + 6 * angles[k]), 1.0, e, m)
+        add_row(at(data, model[MODEL.WORK_COLUMN] + 6 * angles[k]), 1.0, e, m)
         turn, shift = along(turn, spin[k], e), along(shift, spin[k], m)
     set_row(result, turn, shift)
     set_row(at(result, 6), times(sign, turned(kept, left_behind(far, spin, cross(spin, n)))), ZERO)

@@ -100,29 +100,29 @@ def solver_room(obstacles: int) -> int:
     return GEODESIC_ROOM + 4 * (obstacles + 1) + factor_room(count, size) + 2 * count + size
 
 
-def cable_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def cable_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Length and speed of a cable; NaN if it is none, since a point is inside an obstacle."""
-    i, p = at(s, item), at(x, s[item + ITEM.NUMBERS])
-    result = at(w, i[ITEM.RECORD])
+    i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
+    result = at(data, i[ITEM.RECORD])
     elements = at(i, ELEMENTS)
     for k in range(i[COUNT]):
-        place_element(s, w, at(elements, ELEMENT_INTS * k), p, result)
+        place_element(model, data, at(elements, ELEMENT_INTS * k), p, result)
     length, first = 0.0, 0
     for k in range(1, i[COUNT]):
         if elements[ELEMENT_INTS * k + IS_OBSTACLE] == 0:
             length += span(elements, p, result, first, k, at(result, i[SOLVER]))
             first = k
-    result[LENGTH], result[SPEED] = length, speed(s, w, i[COUNT], elements, result)
+    result[LENGTH], result[SPEED] = length, speed(model, data, i[COUNT], elements, result)
     return OUTCOME.OK
 
 
-def place_element(s: Ints, w: Floats, element: Ints, p: Floats, found: Floats) -> None:
+def place_element(model: Ints, data: Floats, element: Ints, p: Floats, found: Floats) -> None:
     """Where an element is in ground; where an obstacle is touched at first."""
     own, kept, link = at(p, element[AT]), at(found, element[KEPT]), element[LINK]
     if element[IS_OBSTACLE] == 0:
-        put(kept, 0, station(s, w, link, vector(own, PLACE)))
+        put(kept, 0, station(model, data, link, vector(own, PLACE)))
         return
-    place_frame(s, w, link, own, vector(own, 9), at(kept, IN_GROUND))
+    place_frame(model, data, link, own, vector(own, 9), at(kept, IN_GROUND))
     for k in range(TOUCH_NUMBERS):
         kept[k] = own[BEGIN + k]
 
@@ -379,30 +379,30 @@ def shoot_again(surface: Floats, geodesic: Floats, corrections: Floats, step: fl
     return shoot(surface, point, plus(t, cross(turning, t)), length, geodesic, room)
 
 
-def speed(s: Ints, w: Floats, count: int, elements: Ints, found: Floats) -> float:
+def speed(model: Ints, data: Floats, count: int, elements: Ints, found: Floats) -> float:
     """Lengthening speed, that of the straight parts; their ends on obstacles move with these."""
     total = 0.0
     here = vector(found, elements[KEPT])
-    moves = velocity(s, w, elements[LINK], here)
+    moves = velocity(model, data, elements[LINK], here)
     for k in range(1, count):
         element = at(elements, ELEMENT_INTS * k)
         kept = at(found, element[KEPT])
         if element[IS_OBSTACLE] == 0 or kept[STATE] == TOUCHES:
             place = 0 if element[IS_OBSTACLE] == 0 else GROUND_START + POINT
             ahead = vector(kept, place)
-            ahead_moves = velocity(s, w, element[LINK], ahead)
+            ahead_moves = velocity(model, data, element[LINK], ahead)
             total += dot(unit(minus(ahead, here)), minus(ahead_moves, moves))
             here, moves = ahead, ahead_moves
             if element[IS_OBSTACLE] != 0:
                 here = vector(kept, GROUND_END + POINT)
-                moves = velocity(s, w, element[LINK], here)
+                moves = velocity(model, data, element[LINK], here)
     return total
 
 
-def pull_cable(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def pull_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Pull at the points of a cable and at both ends of each geodesic; a cable does not push."""
-    i, p = at(s, item), at(x, s[item + ITEM.NUMBERS])
-    result, elements = at(w, i[ITEM.RECORD]), at(i, ELEMENTS)
+    i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
+    result, elements = at(data, i[ITEM.RECORD]), at(i, ELEMENTS)
     tension, last = result[TENSION], i[COUNT] - 1
     if tension < 0.0:
         return OUTCOME.OK
@@ -410,13 +410,13 @@ def pull_cable(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
         element = at(elements, ELEMENT_INTS * k)
         own, kept, link = at(p, element[AT]), at(result, element[KEPT]), element[LINK]
         if element[IS_OBSTACLE] == 0:
-            place = station(s, w, link, vector(own, PULLED))
+            place = station(model, data, link, vector(own, PULLED))
             if k > 0:
-                apply_force(s, w, link, place, times(-tension, vector(kept, BEFORE)))
+                apply_force(model, data, link, place, times(-tension, vector(kept, BEFORE)))
             if k < last:
-                apply_force(s, w, link, place, times(tension, vector(kept, AFTER)))
+                apply_force(model, data, link, place, times(tension, vector(kept, AFTER)))
         elif kept[STATE] == TOUCHES:
             start, end = at(kept, GROUND_START), at(kept, GROUND_END)
-            apply_force(s, w, link, vector(start, POINT), times(-tension, vector(start, ALONG)))
-            apply_force(s, w, link, vector(end, POINT), times(tension, vector(end, ALONG)))
+            apply_force(model, data, link, vector(start, POINT), times(-tension, vector(start, ALONG)))
+            apply_force(model, data, link, vector(end, POINT), times(tension, vector(end, ALONG)))
     return OUTCOME.OK

@@ -28,54 +28,54 @@ from osimlite.kernels.parts import link_work, operation_ints, operation_work
 from osimlite.kernels.pointers import Floats, Ints, at, call
 
 
-def chain_dynamics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> int:
+def chain_dynamics(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int) -> int:
     """Mass matrix, and the bias taken off the generalized forces; f has the rates and these before."""
-    h, right = at(s, s[MODEL.CHAIN]), at(f, s[MODEL.DOFS])
-    move_joints(s, x, w, y, f)
-    status = call(h[CHAIN.SUPPLY], s, x, w, y, f, 0)
+    h, right = at(model, model[MODEL.CHAIN]), at(f, model[MODEL.DOFS])
+    move_joints(model, reals, data, y, f)
+    status = call(h[CHAIN.SUPPLY], model, reals, data, y, f, 0)
     if status != OUTCOME.OK:
         return status
-    forces, shares = at(w, h[CHAIN.WORK_JOINTS] + 3 * h[CHAIN.JOINTS]), at(w, h[CHAIN.WORK_SHARES])
+    forces, shares = at(data, h[CHAIN.WORK_JOINTS] + 3 * h[CHAIN.JOINTS]), at(data, h[CHAIN.WORK_SHARES])
     matrix = at(forces, h[CHAIN.JOINTS])
     for k in range(h[CHAIN.SHARES]):
-        share = at(s, h[CHAIN.SHARE_AT] + SHARE.SIZE * k)
+        share = at(model, h[CHAIN.SHARE_AT] + SHARE.SIZE * k)
         joint, freedom = share[SHARE.JOINT], share[SHARE.DOF]
         if freedom >= 0:
             right[freedom] -= shares[k] * forces[joint]
     for k in range(h[CHAIN.ENTRY_AT], h[CHAIN.END_ENTRY]):
-        w[k] = 0.0
+        data[k] = 0.0
     for k in range(h[CHAIN.PRODUCTS]):
-        product = at(s, h[CHAIN.PRODUCT_AT] + PRODUCT.SIZE * k)
-        w[product[PRODUCT.PLACE]] += (
+        product = at(model, h[CHAIN.PRODUCT_AT] + PRODUCT.SIZE * k)
+        data[product[PRODUCT.PLACE]] += (
             shares[product[PRODUCT.ONE]] * shares[product[PRODUCT.TWO]] * matrix[product[PRODUCT.ENTRY]]
         )
     for k in range(h[CHAIN.EXCESSES]):
-        excess = at(s, h[CHAIN.EXCESS_AT] + EXCESS.SIZE * k)
+        excess = at(model, h[CHAIN.EXCESS_AT] + EXCESS.SIZE * k)
         take_off(
-            s,
-            w,
-            x[excess[EXCESS.NUMBER]],
+            model,
+            data,
+            reals[excess[EXCESS.NUMBER]],
             excess[EXCESS.DOF],
-            at(link_work(s, w, excess[EXCESS.LINK]), LINK_WORK.ACCELERATION),
+            at(link_work(model, data, excess[EXCESS.LINK]), LINK_WORK.ACCELERATION),
             right,
         )
     return OUTCOME.OK
 
 
-def take_off(s: Ints, w: Floats, moment: float, freedom: int, acceleration: Floats, right: Floats) -> None:
+def take_off(model: Ints, data: Floats, moment: float, freedom: int, acceleration: Floats, right: Floats) -> None:
     """Take an inertia off that is the same about every axis, so that no speed alone makes it resist.
 
     Args:
-        s: the mechanism.
-        w: what is known of it.
+        model: the mechanism.
+        data: what is known of it.
         moment: the inertia.
         freedom: the last one on the way from ground to the link that has it.
         acceleration: of the link without udot.
         right: the generalized forces.
     """
-    freedoms, columns = at(s, s[MODEL.DOF_AT]), at(w, s[MODEL.WORK_COLUMN])
+    freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     while freedom >= 0:
-        a, row, other, place = at(columns, 6 * freedom), at(w, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
+        a, row, other, place = at(columns, 6 * freedom), at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
         right[freedom] += moment * (a[0] * acceleration[0] + a[1] * acceleration[1] + a[2] * acceleration[2])
         while other >= 0:
             b = at(columns, 6 * other)
@@ -85,40 +85,45 @@ def take_off(s: Ints, w: Floats, moment: float, freedom: int, acceleration: Floa
         freedom = freedoms[DOF.SIZE * freedom + DOF.ABOVE]
 
 
-def move_joints(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
+def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None:
     """Values, rates, and accelerations without udot of all joints, and the shares; f has the rates of coordinates."""
-    h = at(s, s[MODEL.CHAIN])
+    h = at(model, model[MODEL.CHAIN])
     count = h[CHAIN.JOINTS]
     for number in range(count):
-        joint, moves = at(s, h[CHAIN.JOINT_AT] + JOINT.SIZE * number), at(w, h[CHAIN.WORK_JOINTS] + number)
+        joint, moves = at(model, h[CHAIN.JOINT_AT] + JOINT.SIZE * number), at(data, h[CHAIN.WORK_JOINTS] + number)
         kind, source, part, shares = (
             joint[JOINT.KIND],
             joint[JOINT.SOURCE],
             joint[JOINT.PART],
-            at(w, h[CHAIN.WORK_SHARES] + joint[JOINT.FIRST_SHARE]),
+            at(data, h[CHAIN.WORK_SHARES] + joint[JOINT.FIRST_SHARE]),
         )
         if kind == JOINT_KIND.LINE:
-            factor = x[part]
+            factor = reals[part]
             shares[0] = factor
             moves[0], moves[count], moves[2 * count] = factor * y[source], factor * f[source], 0.0
             continue
-        j = operation_ints(s, source)
-        a = operation_work(s, w, source)
+        j = operation_ints(model, source)
+        a = operation_work(model, data, source)
         if kind == JOINT_KIND.AMOUNT_OF:
             for k in range(j[OPERATION.ARGUMENT_COUNT]):
-                shares[k] = w[j[OPERATION.GRADIENT] + k]
+                shares[k] = data[j[OPERATION.GRADIENT] + k]
             moves[0], moves[count], moves[2 * count] = (
                 a[OPERATION_WORK.AMOUNT],
                 a[OPERATION_WORK.RATE],
                 a[OPERATION_WORK.CURVATURE],
             )
         elif kind == JOINT_KIND.ANGLE:
-            angles = at(s, j[OPERATION.ARGUMENTS])
+            angles = at(model, j[OPERATION.ARGUMENTS])
             moves[0], moves[count] = y[angles[part]], f[angles[part]]
             moves[2 * count] = move_angle(angles, y, f, part, shares)
         elif kind == JOINT_KIND.ELLIPSOID:
             moves[0], moves[count], moves[2 * count] = move_end(
-                at(s, j[OPERATION.ARGUMENTS]), y, at(y, s[MODEL.DOFS]), part, x[j[OPERATION.EXTRA] + part], shares
+                at(model, j[OPERATION.ARGUMENTS]),
+                y,
+                at(y, model[MODEL.DOFS]),
+                part,
+                reals[j[OPERATION.EXTRA] + part],
+                shares,
             )
         else:
             # The joint stands still, and accelerates all the same.

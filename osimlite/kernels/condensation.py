@@ -76,41 +76,41 @@ def condensation_room(size: int, responses: int) -> int:
     return RIGHT_AT * size * size + size + responses * (size + RESPONSE_WORK)
 
 
-def linearise(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, room: Floats, is_evaluated: float) -> int:
+def linearise(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, room: Floats, is_evaluated: float) -> int:
     """Fill the room with masses, generalized forces and derivatives at a state; f is room for its rates.
 
     If `is_evaluated` is not 0, the last evaluation was that of this state.
     """
-    size, status = s[MODEL.DOFS], OUTCOME.OK
+    size, status = model[MODEL.DOFS], OUTCOME.OK
     right = at(f, size)
     if is_evaluated == 0.0:
-        status = call(s[MODEL.LAWS], s, x, w, y, f, STAGE.ACCELERATION)
+        status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.ACCELERATION)
     if status != OUTCOME.OK:
         return status
-    if s[MODEL.CONSTRAINED] > 0:
-        bind(s, x, w, y, f)
-    spatial_inertias_and_bias(s, x, w)
-    composite_rigid_body(s, w, right)
-    masses(s, w, room)
+    if model[MODEL.CONSTRAINED] > 0:
+        bind(model, reals, data, y, f)
+    spatial_inertias_and_bias(model, reals, data)
+    composite_rigid_body(model, data, right)
+    masses(model, data, room)
     stiffness, damping = at(room, STIFFNESS * size * size), at(room, DAMPING * size * size)
     for k in range(size * size):
         stiffness[k] = damping[k] = 0.0
-    turn_levers(s, x, w, stiffness)
-    for number in range(s[MODEL.RESPONSES]):
-        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(s, room, number)
-        clear_wrenches(s, w)
+    turn_levers(model, reals, data, stiffness)
+    for number in range(model[MODEL.RESPONSES]):
+        response, known = at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(model, room, number)
+        clear_wrenches(model, data)
         for k in range(size):
             f[k] = right[k] = 0.0
-        status = call(response[RESPONSE.KERNEL], s, x, w, y, f, response[RESPONSE.ITEM])
+        status = call(response[RESPONSE.KERNEL], model, reals, data, y, f, response[RESPONSE.ITEM])
         if status != OUTCOME.OK:
             return status
         changes = response[RESPONSE.STATES] > 0
         for k in range(INVERSE):
-            known[size + k] = w[WORK.SCRATCH + k]
-            changes = changes or w[WORK.SCRATCH + k] != 0.0
+            known[size + k] = data[WORK.SCRATCH + k]
+            changes = changes or data[WORK.SCRATCH + k] != 0.0
         first, end = size, 0
         if changes:
-            generalized_forces(s, w, right)
+            generalized_forces(model, data, right)
         for k in range(size):
             known[k] = right[k]
             if abs(right[k]) > SLIGHT:
@@ -124,87 +124,87 @@ def linearise(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, room: Floats,
     return OUTCOME.OK
 
 
-def known_of(s: Ints, room: Floats, number: int) -> Floats:
+def known_of(model: Ints, room: Floats, number: int) -> Floats:
     """The part of the room of a force: its generalized force of 1 N, and what RESPONSE_WORK tells."""
-    size = s[MODEL.DOFS]
+    size = model[MODEL.DOFS]
     return at(room, RIGHT_AT * size * size + size + number * (size + RESPONSE_WORK))
 
 
-def masses(s: Ints, w: Floats, mass: Floats) -> None:
+def masses(model: Ints, data: Floats, mass: Floats) -> None:
     """The mass matrix (n, n), heavy across the constraints."""
-    size, freedoms, largest = s[MODEL.DOFS], at(s, s[MODEL.DOF_AT]), 0.0
+    size, freedoms, largest = model[MODEL.DOFS], at(model, model[MODEL.DOF_AT]), 0.0
     for k in range(size * size):
         mass[k] = 0.0
     for k in range(size):
         j, i = at(freedoms, DOF.SIZE * k), k
-        row = at(w, j[DOF.ROW])
+        row = at(data, j[DOF.ROW])
         largest = max(largest, row[0])
         for m in range(j[DOF.DEPTH] + 1):
             mass[size * k + i] = mass[size * i + k] = row[m]
             i = freedoms[DOF.SIZE * i + DOF.ABOVE]
-    if s[MODEL.CONSTRAINED] > 0:
-        h = at(s, s[MODEL.CONSTRAINED])
+    if model[MODEL.CONSTRAINED] > 0:
+        h = at(model, model[MODEL.CONSTRAINED])
         for equation in range(h[CONSTRAINED.EQUATIONS]):
-            row, square = at(w, h[CONSTRAINED.WORK_ROWS] + size * equation), 0.0
+            row, square = at(data, h[CONSTRAINED.WORK_ROWS] + size * equation), 0.0
             for k in range(size):
                 square += row[k] * row[k]
             if square > 0.0:
                 add_product(size, HEAVY * largest / square, row, 0, size, row, 0, size, mass)
 
 
-def turn_levers(s: Ints, x: Floats, w: Floats, levers: Floats) -> None:
+def turn_levers(model: Ints, reals: Floats, data: Floats, levers: Floats) -> None:
     """Add how generalized forces of weights and of contacts change as coordinates move their points, to (n, n).
 
     They are what is left of the inertias, which have served: of each link the force on it and on all that it carries,
     and the sum of products of places (from the origin of the spatial vectors) with forces, by rows.
     """
-    size = s[MODEL.DOFS]
-    for link in range(s[MODEL.LINKS]):
-        b, load = at(x, INERTIA_AT + INERTIA.SIZE * link), at(link_work(s, w, link), LINK_WORK.INERTIA)
+    size = model[MODEL.DOFS]
+    for link in range(model[MODEL.LINKS]):
+        b, load = at(reals, INERTIA_AT + INERTIA.SIZE * link), at(link_work(model, data, link), LINK_WORK.INERTIA)
         for k in range(LOAD):
             load[k] = 0.0
-        weight = times(b[INERTIA.MASS], vector(x, GRAVITY_AT))
-        add_load(s, w, link, station(s, w, link, vector(b, INERTIA.CENTER)), weight, ZERO)
-    for pair in range(s[MODEL.CONTACTS]):
-        i = at(s, s[s[MODEL.CONTACT_AT] + pair])
-        contact = at(w, s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
+        weight = times(b[INERTIA.MASS], vector(reals, GRAVITY_AT))
+        add_load(model, data, link, station(model, data, link, vector(b, INERTIA.CENTER)), weight, ZERO)
+    for pair in range(model[MODEL.CONTACTS]):
+        i = at(model, model[model[MODEL.CONTACT_AT] + pair])
+        contact = at(data, model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
         force, point = vector(contact, CONTACT_WORK.FORCE), vector(contact, CONTACT_WORK.FORCE + 3)
         one, two = i[ITEM.OWN], i[ITEM.OWN + 1]
         if contact[CONTACT_WORK.DEPTH] > 0.0 and max(one, two) >= 0:
-            center = station(s, w, two, vector(x, i[ITEM.NUMBERS] + CENTER))
-            add_load(s, w, two, point, force, minus(center, point))
-            add_load(s, w, one, point, times(-1.0, force), ZERO)
-    for link in range(s[MODEL.LINKS] - 1, -1, -1):
-        i, here = link_ints(s, link), link_work(s, w, link)
+            center = station(model, data, two, vector(reals, i[ITEM.NUMBERS] + CENTER))
+            add_load(model, data, two, point, force, minus(center, point))
+            add_load(model, data, one, point, times(-1.0, force), ZERO)
+    for link in range(model[MODEL.LINKS] - 1, -1, -1):
+        i, here = link_ints(model, link), link_work(model, data, link)
         load, origin = at(here, LINK_WORK.INERTIA), vector(here, LINK_WORK.ORIGIN)
         for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
-            j = operation_ints(s, operation)
+            j = operation_ints(model, operation)
             if j[OPERATION.DOF] < 0 or j[OPERATION.MOTION] >= MOTION.BALL:
                 continue
-            turn, shift = screw(j, operation_work(s, w, operation), origin)
+            turn, shift = screw(j, operation_work(model, data, operation), origin)
             moved = minus(cross(shift, vector(load, 0)), times(load[3] + load[7] + load[11], turn))
             moved, inner, within = plus(moved, turned(at(load, 3), turn)), operation, link
             while within >= 0:
-                other = operation_ints(s, inner)
+                other = operation_ints(model, inner)
                 if other[OPERATION.DOF] >= 0 and other[OPERATION.MOTION] == MOTION.TURN:
-                    change = dot(moved, vector(operation_work(s, w, inner), OPERATION_WORK.AXIS))
+                    change = dot(moved, vector(operation_work(model, data, inner), OPERATION_WORK.AXIS))
                     levers[size * j[OPERATION.DOF] + other[OPERATION.DOF]] += change
                     if inner != operation:
                         levers[size * other[OPERATION.DOF] + j[OPERATION.DOF]] += change
                 inner -= 1
-                while within >= 0 and inner < link_ints(s, within)[LINK.FIRST_OPERATION]:
-                    within = link_ints(s, within)[LINK.PARENT]
-                    inner = link_ints(s, within)[LINK.END_OPERATION] - 1 if within >= 0 else -1
+                while within >= 0 and inner < link_ints(model, within)[LINK.FIRST_OPERATION]:
+                    within = link_ints(model, within)[LINK.PARENT]
+                    inner = link_ints(model, within)[LINK.END_OPERATION] - 1 if within >= 0 else -1
         if i[LINK.PARENT] >= 0:
-            below = at(link_work(s, w, i[LINK.PARENT]), LINK_WORK.INERTIA)
+            below = at(link_work(model, data, i[LINK.PARENT]), LINK_WORK.INERTIA)
             for n in range(LOAD):
                 below[n] += load[n]
 
 
-def add_load(s: Ints, w: Floats, link: int, point: Vector, force: Vector, off: Vector) -> None:
+def add_load(model: Ints, data: Floats, link: int, point: Vector, force: Vector, off: Vector) -> None:
     """Add a force on a link at a point, which moves as does that of the link that is so far off."""
     if link >= 0:
-        here = link_work(s, w, link)
+        here = link_work(model, data, link)
         load, arm = at(here, LINK_WORK.INERTIA), minus(point, vector(here, LINK_WORK.ORIGIN))
         put(load, 0, plus(vector(load, 0), force))
         for k in range(3):
@@ -222,18 +222,18 @@ def add_product(
                 target[k] += scaled * b[k]
 
 
-def condense(s: Ints, c: float, room: Floats) -> bool:
+def condense(model: Ints, c: float, room: Floats) -> bool:
     """Eliminate all but the speeds from 1 - c J; whether that can be solved."""
-    size = s[MODEL.DOFS]
+    size = model[MODEL.DOFS]
     system, levers = at(room, SYSTEM * size * size), at(room, LEVERS * size * size)
     stiffness, damping = at(room, STIFFNESS * size * size), at(room, DAMPING * size * size)
     for k in range(size * size):
         system[k] = room[k] - c * (damping[k] + c * stiffness[k])
         levers[k] = stiffness[k]
-    for number in range(s[MODEL.RESPONSES]):
-        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(s, room, number)
+    for number in range(model[MODEL.RESPONSES]):
+        response, known = at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(model, room, number)
         count, a = response[RESPONSE.STATES], at(known, size)
-        places = at(s, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
+        places = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
         if count == 0:
             continue
         inverse, gains, pulls, driven = at(a, INVERSE), at(a, GAINS), at(a, PULLS), at(a, RIGHT)
@@ -303,18 +303,18 @@ def invert(size: int, a: Floats) -> None:
                     a[size * j + k] -= factor * a[size * i + k]
 
 
-def correct(s: Ints, c: float, room: Floats, d: Floats) -> None:
+def correct(model: Ints, c: float, room: Floats, d: Floats) -> None:
     """Solve (1 - c J) d = r in place, after `condense` with the same c."""
-    size = s[MODEL.DOFS]
+    size = model[MODEL.DOFS]
     du, system, right = at(d, size), at(room, SYSTEM * size * size), at(room, RIGHT_AT * size * size)
     levers = at(room, LEVERS * size * size)
     for i in range(size):
         right[i] = 0.0
         for k in range(size):
             right[i] += room[size * i + k] * du[k] + c * levers[size * i + k] * d[k]
-    for number in range(s[MODEL.RESPONSES]):
-        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(s, room, number)
-        places, a, force = at(s, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE]), at(known, size), 0.0
+    for number in range(model[MODEL.RESPONSES]):
+        response, known = at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(model, room, number)
+        places, a, force = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE]), at(known, size), 0.0
         for k in range(response[RESPONSE.STATES]):
             if places[k] >= 0:
                 force += c * a[PULLS + k] * d[places[k]]
@@ -322,10 +322,10 @@ def correct(s: Ints, c: float, room: Floats, d: Floats) -> None:
             for k in range(int(a[FIRST]), int(a[END])):
                 right[k] += force * known[k]
     substitute(size, system, right)
-    for number in range(s[MODEL.RESPONSES]):
-        response, known = at(s, s[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(s, room, number)
+    for number in range(model[MODEL.RESPONSES]):
+        response, known = at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number), known_of(model, room, number)
         count, a = response[RESPONSE.STATES], at(known, size)
-        places = at(s, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
+        places = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
         if count == 0:
             continue
         first, end = int(a[FIRST]), int(a[END])

@@ -13,19 +13,19 @@ COMPONENT, LENGTH, NEUTRAL, TERMS, SERIES = 2, 3, 4, 6, 7
 series by the square of the angle, and the terms of (sin θ) / θ and (1 - cos θ) / θ²."""
 
 
-def amount_by_arc(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
+def amount_by_arc(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Amount of an operation by the bending of a rod in two angles, with its derivatives."""
     j, kept = (
-        operation_ints(s, operation),
-        operation_work(s, w, operation),
+        operation_ints(model, operation),
+        operation_work(model, data, operation),
     )
-    one, two, p = s[j[OPERATION.ARGUMENTS]], s[j[OPERATION.ARGUMENTS] + 1], at(x, j[OPERATION.EXTRA])
-    table, u = at(p, 2), at(y, s[MODEL.DOFS])
+    one, two, p = model[j[OPERATION.ARGUMENTS]], model[j[OPERATION.ARGUMENTS] + 1], at(reals, j[OPERATION.EXTRA])
+    table, u = at(p, 2), at(y, model[MODEL.DOFS])
     a = (y[one] if one >= 0 else p[0]) + table[NEUTRAL]
     b = (y[two] if two >= 0 else p[1]) + table[NEUTRAL + 1]
     ua, ub = u[one] if one >= 0 else 0.0, u[two] if two >= 0 else 0.0
     value, da, db, daa, dab, dbb = arc_at(table, a, b)
-    w[j[OPERATION.GRADIENT]], w[j[OPERATION.GRADIENT] + 1] = da, db
+    data[j[OPERATION.GRADIENT]], data[j[OPERATION.GRADIENT] + 1] = da, db
     kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE] = value, da * ua + db * ub
     kept[OPERATION_WORK.CURVATURE] = daa * ua * ua + 2.0 * dab * ua * ub + dbb * ub * ub
     return OUTCOME.OK

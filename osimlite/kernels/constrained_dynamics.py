@@ -22,53 +22,57 @@ SLIGHT = 2.0**-19.5
 in Simbody: its complete orthogonal factorization of G M⁻¹ Gᵀ has the square of it as tolerance."""
 
 
-def constrained_dynamics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> int:
+def constrained_dynamics(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int) -> int:
     """Solve for the accelerations: the second half of f has the generalized forces before."""
-    h, size = at(s, s[MODEL.CONSTRAINED]), s[MODEL.DOFS]
+    h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
     right = at(f, size)
-    bind(s, x, w, y, f)
+    bind(model, reals, data, y, f)
     # Of the mass matrix and the forces, nothing is left when they have been solved for.
-    system, matrix = at(w, h[CONSTRAINED.WORK_SYSTEM]), at(w, s[s[MODEL.DOF_AT] + DOF.ROW])
+    system, matrix = at(data, h[CONSTRAINED.WORK_SYSTEM]), at(data, model[model[MODEL.DOF_AT] + DOF.ROW])
     for k in range(h[CONSTRAINED.ENTRIES]):
         system[k] = matrix[k]
     forces = at(system, h[CONSTRAINED.ENTRIES])
     for k in range(size):
         forces[k] = right[k]
-    if solve(s, w, right) < 0 and by_multipliers(s, w, right, at(forces, size)):
+    if solve(model, data, right) < 0 and by_multipliers(model, data, right, at(forces, size)):
         return OUTCOME.OK
-    return by_directions(s, w, system, forces, right, at(forces, size))
+    return by_directions(model, data, system, forces, right, at(forces, size))
 
 
-def bind(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
+def bind(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None:
     """Fill in all equations; f has the rates of the coordinates."""
-    h, size = at(s, s[MODEL.CONSTRAINED]), s[MODEL.DOFS]
-    rows, rates = at(w, h[CONSTRAINED.WORK_ROWS]), at(w, h[CONSTRAINED.WORK_RATES])
+    h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
+    rows, rates = at(data, h[CONSTRAINED.WORK_ROWS]), at(data, h[CONSTRAINED.WORK_RATES])
     for k in range(h[CONSTRAINED.EQUATIONS] * size):
         rows[k] = 0.0
     for k in range(h[CONSTRAINED.EQUATIONS]):
         rates[k] = 0.0
     for number in range(h[CONSTRAINED.CONSTRAINTS]):
-        constraint = s[h[CONSTRAINED.CONSTRAINT_AT] + number]
-        call(s[MODEL.LAWS + s[constraint + ITEM.LAW]], s, x, w, y, f, constraint)
+        constraint = model[h[CONSTRAINED.CONSTRAINT_AT] + number]
+        call(model[MODEL.LAWS + model[constraint + ITEM.LAW]], model, reals, data, y, f, constraint)
 
 
-def by_multipliers(s: Ints, w: Floats, right: Floats, room: Floats) -> bool:
+def by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats) -> bool:
     """From the accelerations without constraints to those with them, if M is well conditioned; room for 2 (n + m).
 
     With M = Uᵀ D U the equations of what U and D make of udot have as their shortest solution the multipliers' push.
     """
-    h, size = at(s, s[MODEL.CONSTRAINED]), s[MODEL.DOFS]
-    count, freedoms, pivots = h[CONSTRAINED.EQUATIONS], at(s, s[MODEL.DOF_AT]), at(w, s[MODEL.WORK_PIVOT])
+    h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
+    count, freedoms, pivots = (
+        h[CONSTRAINED.EQUATIONS],
+        at(model, model[MODEL.DOF_AT]),
+        at(data, model[MODEL.WORK_PIVOT]),
+    )
     scales, push, values, spare = room, at(room, size), at(room, 2 * size), at(room, 2 * size + count)
     for k in range(size):
-        pivot = w[freedoms[DOF.SIZE * k + DOF.ROW]]
+        pivot = data[freedoms[DOF.SIZE * k + DOF.ROW]]
         if not pivot > SAFE_MASS * pivots[k]:
             return False
         scales[k] = 1.0 / sqrt(pivot)
     rows, drifts, weighted = (
-        at(w, h[CONSTRAINED.WORK_ROWS]),
-        at(w, h[CONSTRAINED.WORK_DRIFTS]),
-        at(w, h[CONSTRAINED.WORK_FACTOR]),
+        at(data, h[CONSTRAINED.WORK_ROWS]),
+        at(data, h[CONSTRAINED.WORK_DRIFTS]),
+        at(data, h[CONSTRAINED.WORK_FACTOR]),
     )
     for i in range(count):
         row, turned, longest = at(rows, size * i), at(weighted, size * i), 0.0
@@ -76,10 +80,10 @@ def by_multipliers(s: Ints, w: Floats, right: Floats, room: Floats) -> bool:
             longest = max(longest, abs(row[k]))
         for k in range(size):
             turned[k] = row[k] if longest > ROUNDING else 0.0
-        toward_ground(s, w, turned)
+        toward_ground(model, data, turned)
         for k in range(size):
             turned[k] *= scales[k]
-    factored(s, w, count, weighted, SLIGHT * sqrt(count))
+    factored(model, data, count, weighted, SLIGHT * sqrt(count))
     # The second time mends the rounding of the first.
     for _ in range(2):
         for i in range(count):
@@ -87,48 +91,48 @@ def by_multipliers(s: Ints, w: Floats, right: Floats, room: Floats) -> bool:
             for k in range(size):
                 missing -= row[k] * right[k]
             values[i] = missing
-        solved(s, count, weighted, values, spare, push)
+        solved(model, count, weighted, values, spare, push)
         for k in range(size):
             push[k] *= scales[k]
-        away_from_ground(s, w, push)
+        away_from_ground(model, data, push)
         for k in range(size):
             right[k] += push[k]
     return True
 
 
-def toward_ground(s: Ints, w: Floats, right: Floats) -> None:
+def toward_ground(model: Ints, data: Floats, right: Floats) -> None:
     """Solve with Uᵀ of the factor that `solve` left, in place."""
-    freedoms = at(s, s[MODEL.DOF_AT])
-    for k in range(s[MODEL.DOFS] - 1, -1, -1):
+    freedoms = at(model, model[MODEL.DOF_AT])
+    for k in range(model[MODEL.DOFS] - 1, -1, -1):
         j, load = at(freedoms, DOF.SIZE * k), right[k]
         if is_nothing(load):
             continue
-        row, i = at(w, j[DOF.ROW]), j[DOF.ABOVE]
+        row, i = at(data, j[DOF.ROW]), j[DOF.ABOVE]
         for m in range(1, j[DOF.DEPTH] + 1):
             right[i] -= row[m] * load
             i = freedoms[DOF.SIZE * i + DOF.ABOVE]
 
 
-def away_from_ground(s: Ints, w: Floats, right: Floats) -> None:
+def away_from_ground(model: Ints, data: Floats, right: Floats) -> None:
     """Solve with U of the factor that `solve` left, in place."""
-    freedoms = at(s, s[MODEL.DOF_AT])
-    for k in range(s[MODEL.DOFS]):
+    freedoms = at(model, model[MODEL.DOF_AT])
+    for k in range(model[MODEL.DOFS]):
         j, total = at(freedoms, DOF.SIZE * k), right[k]
-        row, i = at(w, j[DOF.ROW]), j[DOF.ABOVE]
+        row, i = at(data, j[DOF.ROW]), j[DOF.ABOVE]
         for m in range(1, j[DOF.DEPTH] + 1):
             total -= row[m] * right[i]
             i = freedoms[DOF.SIZE * i + DOF.ABOVE]
         right[k] = total
 
 
-def by_directions(s: Ints, w: Floats, matrix: Floats, forces: Floats, right: Floats, room: Floats) -> int:
+def by_directions(model: Ints, data: Floats, matrix: Floats, forces: Floats, right: Floats, room: Floats) -> int:
     """The accelerations by the null space of the equations; room for 2 n (n + 1) numbers, or 2 m more than that."""
-    h, size = at(s, s[MODEL.CONSTRAINED]), s[MODEL.DOFS]
+    h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
     count, rows, drifts, equations = (
         h[CONSTRAINED.EQUATIONS],
-        at(w, h[CONSTRAINED.WORK_ROWS]),
-        at(w, h[CONSTRAINED.WORK_DRIFTS]),
-        at(w, h[CONSTRAINED.WORK_FACTOR]),
+        at(data, h[CONSTRAINED.WORK_ROWS]),
+        at(data, h[CONSTRAINED.WORK_DRIFTS]),
+        at(data, h[CONSTRAINED.WORK_FACTOR]),
     )
     # All equations weigh the same, but those that are rounding errors.
     values, spare = room, at(room, count)
@@ -144,12 +148,12 @@ def by_directions(s: Ints, w: Floats, matrix: Floats, forces: Floats, right: Flo
         values[i] = scale * drifts[i]
         for k in range(size):
             equations[size * i + k] = scale * rows[size * i + k]
-    rank = factored(s, w, count, equations, REDUNDANT)
+    rank = factored(model, data, count, equations, REDUNDANT)
     free = size - rank
-    solved(s, count, equations, values, spare, right)
+    solved(model, count, equations, values, spare, right)
     pushed, reduced, basis = at(spare, count), at(spare, count + 2 * size), at(spare, count + 2 * size + size * size)
     rest = at(pushed, size)
-    times_mass(s, matrix, right, pushed)
+    times_mass(model, matrix, right, pushed)
     for k in range(size):
         forces[k] -= pushed[k]
     for j in range(free):
@@ -157,7 +161,7 @@ def by_directions(s: Ints, w: Floats, matrix: Floats, forces: Floats, right: Flo
         for k in range(size):
             direction[k] = 1.0 if k == rank + j else 0.0
         apply_q(size, equations, rank, direction)
-        times_mass(s, matrix, direction, pushed)
+        times_mass(model, matrix, direction, pushed)
         for i in range(j + 1):
             total = 0.0
             for k in range(size):
@@ -176,9 +180,9 @@ def by_directions(s: Ints, w: Floats, matrix: Floats, forces: Floats, right: Flo
     return OUTCOME.OK
 
 
-def times_mass(s: Ints, matrix: Floats, u: Floats, found: Floats) -> None:
+def times_mass(model: Ints, matrix: Floats, u: Floats, found: Floats) -> None:
     """The mass matrix, of which the rows stand one after the other, times a vector."""
-    size, freedoms, place = s[MODEL.DOFS], at(s, s[MODEL.DOF_AT]), 0
+    size, freedoms, place = model[MODEL.DOFS], at(model, model[MODEL.DOF_AT]), 0
     for k in range(size):
         found[k] = 0.0
     for k in range(size):

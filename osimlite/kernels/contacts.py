@@ -23,87 +23,89 @@ SMOOTH = 9
 """How many numbers the law of smooth contact has."""
 
 
-def touch_half_space(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def touch_half_space(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """A sphere on a half space."""
-    d, radius, n, point = on_half_space(s, x, w, item)
+    d, radius, n, point = on_half_space(model, reals, data, item)
     if d > 0.0:
-        press(s, x, w, item, d, radius, n, point)
+        press(model, reals, data, item, d, radius, n, point)
     return OUTCOME.OK
 
 
-def touch_spheres(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def touch_spheres(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Two spheres."""
-    d, radius, n, point = on_sphere(s, x, w, item)
+    d, radius, n, point = on_sphere(model, reals, data, item)
     if d > 0.0:
-        press(s, x, w, item, d, radius, n, point)
+        press(model, reals, data, item, d, radius, n, point)
     return OUTCOME.OK
 
 
-def on_half_space(s: Ints, x: Floats, w: Floats, item: int) -> tuple[float, float, Vector, Vector]:
+def on_half_space(model: Ints, reals: Floats, data: Floats, item: int) -> tuple[float, float, Vector, Vector]:
     """Depth, effective radius, normal and point of a sphere on a half space."""
-    i = at(s, item)
-    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(x, i[ITEM.NUMBERS])
-    o, n = station(s, w, one, vector(p, 0)), direction(s, w, one, vector(p, 3))
-    d, point = half_space_sphere(o, n, station(s, w, two, vector(p, 7)), p[10], p[12])
+    i = at(model, item)
+    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
+    o, n = station(model, data, one, vector(p, 0)), direction(model, data, one, vector(p, 3))
+    d, point = half_space_sphere(o, n, station(model, data, two, vector(p, 7)), p[10], p[12])
     return d, p[10], n, point
 
 
-def on_sphere(s: Ints, x: Floats, w: Floats, item: int) -> tuple[float, float, Vector, Vector]:
+def on_sphere(model: Ints, reals: Floats, data: Floats, item: int) -> tuple[float, float, Vector, Vector]:
     """Depth, effective radius, normal and point of two spheres."""
-    i = at(s, item)
-    p = at(x, i[ITEM.NUMBERS])
-    one, two = station(s, w, i[ITEM.OWN], vector(p, 0)), station(s, w, i[ITEM.OWN + 1], vector(p, 7))
+    i = at(model, item)
+    p = at(reals, i[ITEM.NUMBERS])
+    one, two = station(model, data, i[ITEM.OWN], vector(p, 0)), station(model, data, i[ITEM.OWN + 1], vector(p, 7))
     return sphere_sphere(one, p[6], two, p[10], p[12])
 
 
-def contact_response(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def contact_response(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Apply 1 N along the normal of a contact or across it, and leave in SCRATCH how its force there changes.
 
     The integers of the item are how far before it that of the contact is, 0 along the normal, 1 and 2 across it, and
     whether surface 1 is a half space. Friction grows with the force along the normal, and that as the depth to 1.5.
     """
-    i, change = at(s, item), at(w, WORK.SCRATCH)
+    i, change = at(model, item), at(data, WORK.SCRATCH)
     pair, axis = item - i[ITEM.OWN], i[ITEM.OWN + 1]
     for k in range(INVERSE):
         change[k] = 0.0
-    d, radius, n, point = on_half_space(s, x, w, pair) if i[ITEM.OWN + 2] > 0 else on_sphere(s, x, w, pair)
+    d, radius, n, point = (
+        on_half_space(model, reals, data, pair) if i[ITEM.OWN + 2] > 0 else on_sphere(model, reals, data, pair)
+    )
     if d > 0.0:
-        one, two, p = s[pair + ITEM.OWN], s[pair + ITEM.OWN + 1], at(x, s[pair + ITEM.NUMBERS])
-        v = minus(velocity(s, w, one, point), velocity(s, w, two, point))
+        one, two, p = model[pair + ITEM.OWN], model[pair + ITEM.OWN + 1], at(reals, model[pair + ITEM.NUMBERS])
+        v = minus(velocity(model, data, one, point), velocity(model, data, two, point))
         changes = contact_derivatives(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
-        center = station(s, w, two, vector(p, CENTER))
-        respond(s, w, y, f, one, two, axis, point, center, n, v, 1.0 - p[12], changes, 1.5 / d)
+        center = station(model, data, two, vector(p, CENTER))
+        respond(model, data, y, f, one, two, axis, point, center, n, v, 1.0 - p[12], changes, 1.5 / d)
     return OUTCOME.OK
 
 
-def smooth_contact_response(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def smooth_contact_response(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """The same of a smooth contact of a sphere with a half space.
 
     The integers of the item are how far behind it that of the contact is, and the direction. The numbers of that are
     those of the law, and of the sphere on the plane (:mod:`osimlite.simulation.elements.geometries.sphere_on_plane`).
     """
-    i, change = at(s, item), at(w, WORK.SCRATCH)
+    i, change = at(model, item), at(data, WORK.SCRATCH)
     for k in range(INVERSE):
         change[k] = 0.0
     contact = item + i[ITEM.OWN]
-    p, g = at(x, s[contact + ITEM.NUMBERS]), at(s, contact + ITEM.OWN)
+    p, g = at(reals, model[contact + ITEM.NUMBERS]), at(model, contact + ITEM.OWN)
     place = at(p, SMOOTH)
-    n, center = direction(s, w, g[0], vector(place, 3)), station(s, w, g[1], vector(place, 6))
-    d = place[9] - dot(minus(center, station(s, w, g[0], vector(place, 0))), n)
+    n, center = direction(model, data, g[0], vector(place, 3)), station(model, data, g[1], vector(place, 6))
+    d = place[9] - dot(minus(center, station(model, data, g[0], vector(place, 0))), n)
     point = along(center, 0.5 * d - place[9], n)
-    v = minus(velocity(s, w, g[0], point), velocity(s, w, g[1], point))
+    v = minus(velocity(model, data, g[0], point), velocity(model, data, g[1], point))
     pressed, damped, dragged, growth = smooth_contact_derivatives(
         d, place[9], p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], n, v
     )
     if growth != 0.0:
         changes = pressed, damped, dragged
-        respond(s, w, y, f, g[0], g[1], i[ITEM.OWN + 1], point, center, n, v, 0.5, changes, growth)
+        respond(model, data, y, f, g[0], g[1], i[ITEM.OWN + 1], point, center, n, v, 0.5, changes, growth)
     return OUTCOME.OK
 
 
 def respond(
-    s: Ints,
-    w: Floats,
+    model: Ints,
+    data: Floats,
     y: Floats,
     f: Floats,
     one: int,
@@ -129,7 +131,7 @@ def respond(
         changes: derivatives along the normal by depth and approach, and force across it over the slip.
         growth: by what part the force grows with the depth.
     """
-    change, (pressed, damped, dragged) = at(w, WORK.SCRATCH), changes
+    change, (pressed, damped, dragged) = at(data, WORK.SCRATCH), changes
     way, by_depth = n, 0.0
     if axis > 0:
         # Any two directions across the normal do.
@@ -142,15 +144,15 @@ def respond(
         change[1], by_depth = -dragged, -growth * dragged * dot(v, way)
     else:
         change[0], change[1] = -pressed, -damped
-    apply_force(s, w, two, point, way)
-    apply_force(s, w, one, point, times(-1.0, way))
-    turns(s, w, y, f, two, point, center, n, times(sinks, n), times(by_depth, n), times(change[1], way))
-    turns(s, w, y, f, one, point, point, n, times(sinks, n), times(-by_depth, n), times(-change[1], way))
+    apply_force(model, data, two, point, way)
+    apply_force(model, data, one, point, times(-1.0, way))
+    turns(model, data, y, f, two, point, center, n, times(sinks, n), times(by_depth, n), times(change[1], way))
+    turns(model, data, y, f, one, point, point, n, times(sinks, n), times(-by_depth, n), times(-change[1], way))
 
 
 def turns(
-    s: Ints,
-    w: Floats,
+    model: Ints,
+    data: Floats,
     y: Floats,
     row: Floats,
     link: int,
@@ -167,13 +169,13 @@ def turns(
     """
     if link < 0:
         return
-    here = link_work(s, w, link)
+    here = link_work(model, data, link)
     origin, spin = vector(here, LINK_WORK.ORIGIN), vector(here, LINK_WORK.VELOCITY)
     arm, turning, shifting = minus(point, origin), ZERO, ZERO
     while link >= 0:
-        i = link_ints(s, link)
+        i = link_ints(model, link)
         for operation in range(i[LINK.END_OPERATION] - 1, i[LINK.FIRST_OPERATION] - 1, -1):
-            j, a = operation_ints(s, operation), operation_work(s, w, operation)
+            j, a = operation_ints(model, operation), operation_work(model, data, operation)
             if j[OPERATION.MOTION] >= MOTION.BALL:
                 continue
             turn, shift = screw(j, a, origin)
@@ -184,19 +186,21 @@ def turns(
                 swept = plus(plus(cross(turn, shifting), cross(shift, turning)), cross(cross(turn, turning), arm))
                 placed = dot(by_place, plus(shift, cross(turn, arm)))
                 row[j[OPERATION.DOF]] += placed + dot(by_motion, plus(swept, cross(spin, moved)))
-                rate = y[s[MODEL.DOFS] + j[OPERATION.DOF]]
+                rate = y[model[MODEL.DOFS] + j[OPERATION.DOF]]
             turning, shifting = along(turning, rate, turn), along(shifting, rate, shift)
         link = i[LINK.PARENT]
 
 
-def press(s: Ints, x: Floats, w: Floats, item: int, d: float, radius: float, n: Vector, point: Vector) -> None:
+def press(
+    model: Ints, reals: Floats, data: Floats, item: int, d: float, radius: float, n: Vector, point: Vector
+) -> None:
     """The force of a contact of a depth at a point, on both surfaces and in the record."""
-    i = at(s, item)
-    one, two, p, result = i[ITEM.OWN], i[ITEM.OWN + 1], at(x, i[ITEM.NUMBERS]), at(w, i[ITEM.RECORD])
-    v = minus(velocity(s, w, one, point), velocity(s, w, two, point))
+    i = at(model, item)
+    one, two, p, result = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])
+    v = minus(velocity(model, data, one, point), velocity(model, data, two, point))
     force = contact_force(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
     put(result, 0, force)
     put(result, 3, point)
     result[6], result[7] = d, radius
-    apply_force(s, w, two, point, force)
-    apply_force(s, w, one, point, times(-1.0, force))
+    apply_force(model, data, two, point, force)
+    apply_force(model, data, one, point, times(-1.0, force))

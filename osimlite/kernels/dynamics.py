@@ -34,47 +34,49 @@ SMALLEST_PIVOT = 1e-13
 moves no mass."""
 
 
-def evaluate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) -> int:
-    """The derivative f of the state y = (q, u, z): positions, speeds, auxiliary states. All else stays in `w`.
+def evaluate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, stage: int) -> int:
+    """The derivative f of the state y = (q, u, z): positions, speeds, auxiliary states. All else stays in `data`.
 
     Returns:
         OK or what went wrong; with SINGULAR_MASS, f[0] is the degree of freedom that moves no mass.
     """
-    place(s, x, w, y, f)
+    place(model, reals, data, y, f)
     if stage == STAGE.POSITION:
         return OUTCOME.OK
-    status = move(s, x, w, y, f)
+    status = move(model, reals, data, y, f)
     if status != OUTCOME.OK or stage == STAGE.VELOCITY:
         return status
-    right = at(f, s[MODEL.DOFS])
-    if stage == STAGE.FORCE or s[MODEL.CHAIN] > 0:
-        clear_wrenches(s, w)
-        status = apply_forces(s, x, w, y, f)
-        generalized_forces(s, w, right)
+    right = at(f, model[MODEL.DOFS])
+    if stage == STAGE.FORCE or model[MODEL.CHAIN] > 0:
+        clear_wrenches(model, data)
+        status = apply_forces(model, reals, data, y, f)
+        generalized_forces(model, data, right)
         if stage == STAGE.ACCELERATION and status == OUTCOME.OK:
-            status = call(s[MODEL.LAWS + s[s[MODEL.CHAIN] + CHAIN.DYNAMICS]], s, x, w, y, f, 0)
+            status = call(model[MODEL.LAWS + model[model[MODEL.CHAIN] + CHAIN.DYNAMICS]], model, reals, data, y, f, 0)
     else:
-        spatial_inertias_and_bias(s, x, w)
-        status = apply_forces(s, x, w, y, f)
-        composite_rigid_body(s, w, right)
+        spatial_inertias_and_bias(model, reals, data)
+        status = apply_forces(model, reals, data, y, f)
+        composite_rigid_body(model, data, right)
     if stage == STAGE.FORCE or status != OUTCOME.OK:
         return status
-    if s[MODEL.CONSTRAINED] > 0:
-        return call(s[MODEL.LAWS + s[s[MODEL.CONSTRAINED] + CONSTRAINED.DYNAMICS]], s, x, w, y, f, 0)
-    singular = solve(s, w, right)
+    if model[MODEL.CONSTRAINED] > 0:
+        return call(
+            model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.DYNAMICS]], model, reals, data, y, f, 0
+        )
+    singular = solve(model, data, right)
     if singular >= 0:
         f[0] = singular
         return OUTCOME.SINGULAR_MASS
     return OUTCOME.OK
 
 
-def inverse(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> int:
+def inverse(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int) -> int:
     """The generalized forces that are missing for accelerations, constraints left aside.
 
     Args:
-        s: the mechanism.
-        x: its numbers.
-        w: room.
+        model: the mechanism.
+        reals: its numbers.
+        data: room.
         y: the state.
         f: udot behind the place of the rates; the forces (N, N m) take its place.
         unused: any number.
@@ -82,32 +84,32 @@ def inverse(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) ->
     Returns:
         OK or what went wrong, as of `evaluate`.
     """
-    place(s, x, w, y, f)
-    status = move(s, x, w, y, f)
+    place(model, reals, data, y, f)
+    status = move(model, reals, data, y, f)
     if status != OUTCOME.OK:
         return status
-    right = at(f, s[MODEL.DOFS])
-    accelerate(s, w, right)
-    spatial_inertias_and_bias(s, x, w)
-    status = apply_forces(s, x, w, y, f)
-    generalized_forces(s, w, right)
-    for freedom in range(s[MODEL.DOFS]):
+    right = at(f, model[MODEL.DOFS])
+    accelerate(model, data, right)
+    spatial_inertias_and_bias(model, reals, data)
+    status = apply_forces(model, reals, data, y, f)
+    generalized_forces(model, data, right)
+    for freedom in range(model[MODEL.DOFS]):
         right[freedom] = -right[freedom]
     return status
 
 
-def equilibrate(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, stage: int) -> int:
+def equilibrate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, stage: int) -> int:
     """Bring what can be into equilibrium: changes auxiliary states in y, also after one has failed.
 
     Returns:
         OK, or what went wrong; with UNSOLVED, f[0] is the number of the first that has no equilibrium.
     """
-    status = call(s[MODEL.LAWS], s, x, w, y, f, stage)
+    status = call(model[MODEL.LAWS], model, reals, data, y, f, stage)
     if status != OUTCOME.OK:
         return status
-    for k in range(s[MODEL.EQUILIBRIA] - 1, -1, -1):
-        j = at(s, s[MODEL.EQUILIBRIUM_AT] + EQUILIBRIUM.SIZE * k)
-        if call(j[EQUILIBRIUM.KERNEL], s, x, w, y, f, j[EQUILIBRIUM.ITEM]) != OUTCOME.OK:
+    for k in range(model[MODEL.EQUILIBRIA] - 1, -1, -1):
+        j = at(model, model[MODEL.EQUILIBRIUM_AT] + EQUILIBRIUM.SIZE * k)
+        if call(j[EQUILIBRIUM.KERNEL], model, reals, data, y, f, j[EQUILIBRIUM.ITEM]) != OUTCOME.OK:
             status, f[0] = OUTCOME.UNSOLVED, k
     return status
 
@@ -128,10 +130,10 @@ def momentum(i: Floats, spin: Vector, velocity: Vector) -> tuple[Vector, Vector]
     )
 
 
-def spatial_inertias_and_bias(s: Ints, x: Floats, w: Floats) -> None:
+def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
     """Inertias of the links, and the wrenches that are missing for their accelerations without udot."""
-    for link in range(s[MODEL.LINKS]):
-        b, here = at(x, INERTIA_AT + INERTIA.SIZE * link), link_work(s, w, link)
+    for link in range(model[MODEL.LINKS]):
+        b, here = at(reals, INERTIA_AT + INERTIA.SIZE * link), link_work(model, data, link)
         r, i, m = at(here, LINK_WORK.ROTATION), at(here, LINK_WORK.INERTIA), b[INERTIA.MASS]
         center = plus(
             minus(vector(here, LINK_WORK.POSITION), vector(here, LINK_WORK.ORIGIN)),
@@ -158,15 +160,15 @@ def spatial_inertias_and_bias(s: Ints, x: Floats, w: Floats) -> None:
         put(here, LINK_WORK.WRENCH + 3, times(-1.0, plus(force, cross(spin, linear))))
 
 
-def accelerate(s: Ints, w: Floats, udot: Floats) -> None:
+def accelerate(model: Ints, data: Floats, udot: Floats) -> None:
     """Add what udot gives to the accelerations of the links, outwards from ground."""
-    columns = at(w, s[MODEL.WORK_COLUMN])
-    for link in range(s[MODEL.LINKS]):
-        j, here = link_ints(s, link), link_work(s, w, link)
+    columns = at(data, model[MODEL.WORK_COLUMN])
+    for link in range(model[MODEL.LINKS]):
+        j, here = link_ints(model, link), link_work(model, data, link)
         # The wrench is not needed yet; its place has what the links before add.
         turn, shift = ZERO, ZERO
         if j[LINK.PARENT] >= 0:
-            above = at(link_work(s, w, j[LINK.PARENT]), LINK_WORK.WRENCH)
+            above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.WRENCH)
             turn, shift = vector(above, 0), vector(above, 3)
         for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
             c = at(columns, 6 * freedom)
@@ -177,98 +179,98 @@ def accelerate(s: Ints, w: Floats, udot: Floats) -> None:
         put(here, LINK_WORK.ACCELERATION + 3, plus(vector(here, LINK_WORK.ACCELERATION + 3), shift))
 
 
-def clear_wrenches(s: Ints, w: Floats) -> None:
+def clear_wrenches(model: Ints, data: Floats) -> None:
     """No wrench on any link."""
-    for link in range(s[MODEL.LINKS]):
-        load = at(link_work(s, w, link), LINK_WORK.WRENCH)
+    for link in range(model[MODEL.LINKS]):
+        load = at(link_work(model, data, link), LINK_WORK.WRENCH)
         for k in range(6):
             load[k] = 0.0
 
 
-def apply_forces(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
+def apply_forces(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
     """Add what all items push to the wrenches, or to the generalized forces behind the rates in f.
 
     Returns:
         OK, or what the kernel of an item says; then f[0] is the number of the item.
     """
-    for number in range(s[MODEL.DOFS], s[MODEL.STATE_SIZE]):
+    for number in range(model[MODEL.DOFS], model[MODEL.STATE_SIZE]):
         f[number] = 0.0
-    for number in range(s[MODEL.CONTACTS]):
-        result = at(w, s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * number)
+    for number in range(model[MODEL.CONTACTS]):
+        result = at(data, model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * number)
         result[0], result[1], result[2], result[CONTACT_WORK.DEPTH] = 0.0, 0.0, 0.0, 0.0
-    for number in range(s[MODEL.RUNS]):
-        run = s[MODEL.RUN_AT] + RUN.SIZE * number
-        if s[run + RUN.LAW] != 0:
-            status = call(s[run + RUN.LAW], s, x, w, y, f, run)
+    for number in range(model[MODEL.RUNS]):
+        run = model[MODEL.RUN_AT] + RUN.SIZE * number
+        if model[run + RUN.LAW] != 0:
+            status = call(model[run + RUN.LAW], model, reals, data, y, f, run)
             if status != OUTCOME.OK:
                 return status
             continue
-        for k in range(s[run + RUN.FIRST], s[run + RUN.END]):
-            item = s[s[MODEL.ITEM_AT] + k]
-            status = call(s[item + ITEM.LAW], s, x, w, y, f, item)
+        for k in range(model[run + RUN.FIRST], model[run + RUN.END]):
+            item = model[model[MODEL.ITEM_AT] + k]
+            status = call(model[item + ITEM.LAW], model, reals, data, y, f, item)
             if status != OUTCOME.OK:
                 f[0] = k
                 return status
     return OUTCOME.OK
 
 
-def generalized_forces(s: Ints, w: Floats, right: Floats) -> None:
+def generalized_forces(model: Ints, data: Floats, right: Floats) -> None:
     """The generalized forces of the wrenches, inwards from the leaves."""
-    columns = at(w, s[MODEL.WORK_COLUMN])
-    for link in range(s[MODEL.LINKS] - 1, -1, -1):
+    columns = at(data, model[MODEL.WORK_COLUMN])
+    for link in range(model[MODEL.LINKS] - 1, -1, -1):
         j, load = (
-            link_ints(s, link),
-            at(link_work(s, w, link), LINK_WORK.WRENCH),
+            link_ints(model, link),
+            at(link_work(model, data, link), LINK_WORK.WRENCH),
         )
         for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
             c = at(columns, 6 * freedom)
             for k in range(6):
                 right[freedom] += c[k] * load[k]
         if j[LINK.PARENT] >= 0:
-            above = at(link_work(s, w, j[LINK.PARENT]), LINK_WORK.WRENCH)
+            above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.WRENCH)
             for k in range(6):
                 above[k] += load[k]
 
 
-def composite_rigid_body(s: Ints, w: Floats, right: Floats) -> None:
+def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
     """Mass matrix, and the generalized forces, inwards from the leaves."""
-    freedoms, columns = at(s, s[MODEL.DOF_AT]), at(w, s[MODEL.WORK_COLUMN])
-    for link in range(s[MODEL.LINKS] - 1, -1, -1):
-        j, here = link_ints(s, link), link_work(s, w, link)
+    freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
+    for link in range(model[MODEL.LINKS] - 1, -1, -1):
+        j, here = link_ints(model, link), link_work(model, data, link)
         i, load = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH)
         for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
             c = at(columns, 6 * freedom)
             turn, shift = vector(c, 0), vector(c, 3)
             right[freedom] += dot(turn, vector(load, 0)) + dot(shift, vector(load, 3))
             angular, linear = momentum(i, turn, shift)
-            row, k, place = at(w, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
+            row, k, place = at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
             while k >= 0:
                 c = at(columns, 6 * k)
                 row[place] = dot(vector(c, 0), angular) + dot(vector(c, 3), linear)
                 k = freedoms[DOF.SIZE * k + DOF.ABOVE]
                 place += 1
         if j[LINK.PARENT] >= 0:
-            above = at(link_work(s, w, j[LINK.PARENT]), LINK_WORK.INERTIA)
+            above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.INERTIA)
             # The wrench stands behind the inertia.
             for k in range(16):
                 above[k] += i[k]
 
 
-def solve(s: Ints, w: Floats, right: Floats) -> int:
+def solve(model: Ints, data: Floats, right: Floats) -> int:
     """Solve for the accelerations in place; returns the degree of freedom that moves no mass, or -1."""
-    size, freedoms, pivots = s[MODEL.DOFS], at(s, s[MODEL.DOF_AT]), at(w, s[MODEL.WORK_PIVOT])
+    size, freedoms, pivots = model[MODEL.DOFS], at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_PIVOT])
     for k in range(size):
-        pivots[k] = w[freedoms[DOF.SIZE * k + DOF.ROW]]
+        pivots[k] = data[freedoms[DOF.SIZE * k + DOF.ROW]]
     for k in range(size - 1, -1, -1):
         j = at(freedoms, DOF.SIZE * k)
-        row, depth, i = at(w, j[DOF.ROW]), j[DOF.DEPTH], j[DOF.ABOVE]
+        row, depth, i = at(data, j[DOF.ROW]), j[DOF.DEPTH], j[DOF.ABOVE]
         pivot = row[0]
         if not pivot > SMALLEST_PIVOT * pivots[k]:
             return k
         inverse, load = 1.0 / pivot, right[k]
         for m in range(1, depth + 1):
             a = row[m] * inverse
-            target = at(w, freedoms[DOF.SIZE * i + DOF.ROW])
+            target = at(data, freedoms[DOF.SIZE * i + DOF.ROW])
             for t in range(depth + 1 - m):
                 target[t] -= a * row[m + t]
             right[i] -= a * load
@@ -277,7 +279,7 @@ def solve(s: Ints, w: Floats, right: Floats) -> int:
         right[k] = load * inverse
     for k in range(size):
         j = at(freedoms, DOF.SIZE * k)
-        row, i, total = at(w, j[DOF.ROW]), j[DOF.ABOVE], right[k]
+        row, i, total = at(data, j[DOF.ROW]), j[DOF.ABOVE], right[k]
         for m in range(1, j[DOF.DEPTH] + 1):
             total -= row[m] * right[i]
             i = freedoms[DOF.SIZE * i + DOF.ABOVE]

@@ -37,45 +37,70 @@ def judge(h: Floats, t1: float, error: float, order: float) -> None:
 
 
 def projected(
-    s: Ints, x: Floats, w: Floats, t: float, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float
+    model: Ints,
+    reals: Floats,
+    data: Floats,
+    t: float,
+    y: Floats,
+    off: Floats,
+    has_errors: int,
+    tolerance: float,
+    limit: float,
 ) -> bool:
     """Move a state to where the constraints hold, and tell whether they do; see `projection.project`."""
-    w[WORK.TIME], w[WORK.SCRATCH], w[WORK.SCRATCH + 1] = t, tolerance, limit
+    data[WORK.TIME], data[WORK.SCRATCH], data[WORK.SCRATCH + 1] = t, tolerance, limit
     return (
-        call(s[MODEL.LAWS + s[s[MODEL.CONSTRAINED] + CONSTRAINED.PROJECT]], s, x, w, y, off, has_errors) == OUTCOME.OK
+        call(
+            model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.PROJECT]],
+            model,
+            reals,
+            data,
+            y,
+            off,
+            has_errors,
+        )
+        == OUTCOME.OK
     )
 
 
 def step_error(
-    s: Ints, x: Floats, w: Floats, t1: float, y0: Floats, y1: Floats, errors: Floats, h: Floats, is_strict: int
+    model: Ints,
+    reals: Floats,
+    data: Floats,
+    t1: float,
+    y0: Floats,
+    y1: Floats,
+    errors: Floats,
+    h: Floats,
+    is_strict: int,
 ) -> float:
     """The norm of the errors of a step, once its end was moved to where the constraints hold; see `error_norm`."""
-    error = error_norm(s, y0, errors, h, is_strict)
+    error = error_norm(model, y0, errors, h, is_strict)
     # As in Simbody: what half a step would not mend, neither does the projection.
-    if s[MODEL.CONSTRAINED] == 0 or not error <= 16.0 * h[ACCEPTED]:
+    if model[MODEL.CONSTRAINED] == 0 or not error <= 16.0 * h[ACCEPTED]:
         return error
     tolerance = h[ACCEPTED] / 10.0
-    for k in range(s[MODEL.STATE_SIZE]):
+    for k in range(model[MODEL.STATE_SIZE]):
         errors[k] = abs(errors[k])
-    if not projected(s, x, w, t1, y1, errors, 1, tolerance, max(2.0 * tolerance, sqrt(tolerance))):
+    if not projected(model, reals, data, t1, y1, errors, 1, tolerance, max(2.0 * tolerance, sqrt(tolerance))):
         return inf
-    return error_norm(s, y0, errors, h, is_strict)
+    return error_norm(model, y0, errors, h, is_strict)
 
 
-def error_norm(s: Ints, y0: Floats, errors: Floats, h: Floats, is_strict: int) -> float:
+def error_norm(model: Ints, y0: Floats, errors: Floats, h: Floats, is_strict: int) -> float:
     """Largest of three root mean squares: errors of q as they are, of u and z relative to y0 where |y0| > 1.
 
     That is Simbody's norm. A fiber among those of many muscles can err much in it. An explicit method brings such a one
     back, since it has to take short steps; implicit ones may not, and are strict: of z, the largest error counts.
 
     Args:
-        s: the mechanism.
+        model: the mechanism.
         y0: state at the start of the step.
         errors: of its end.
         h: place of the method.
         is_strict: whether the largest error of z counts.
     """
-    n, size = s[MODEL.DOFS], s[MODEL.STATE_SIZE]
+    n, size = model[MODEL.DOFS], model[MODEL.STATE_SIZE]
     of_q = of_u = of_z = 0.0
     for k in range(n):
         of_q += errors[k] * errors[k]

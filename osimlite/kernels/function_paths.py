@@ -25,55 +25,55 @@ places of the arguments in a state (-1 for what does not change). Its numbers be
 DERIVATIVES = 1
 
 
-def function_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def function_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Length and speed of a FunctionBasedPath, and its moment arms."""
-    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
+    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     count, coordinates = i[COUNT], at(i, COORDINATES)
-    length = called(s, x, w, y, f, item - i[LENGTH_BACK])
+    length = called(model, reals, data, y, f, item - i[LENGTH_BACK])
     speed = 0.0
     for k in range(count):
         back = coordinates[count + k]
-        arm = called(s, x, w, y, f, item - back)[0] if back > 0 else -length[DERIVATIVES + k]
+        arm = called(model, reals, data, y, f, item - back)[0] if back > 0 else -length[DERIVATIVES + k]
         result[ARMS + k] = arm
         if coordinates[k] >= 0:
             speed -= arm * f[coordinates[k]]
     if i[SPEED_BACK] > 0:
-        speed = called(s, x, w, y, f, item - i[SPEED_BACK])[0]
+        speed = called(model, reals, data, y, f, item - i[SPEED_BACK])[0]
     result[LENGTH], result[SPEED] = length[0], speed
     return OUTCOME.OK
 
 
-def called(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> Floats:
+def called(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> Floats:
     """The record of a function after it was computed."""
-    call(s[item + ITEM.LAW], s, x, w, y, f, item)
-    return at(w, s[item + ITEM.RECORD])
+    call(model[item + ITEM.LAW], model, reals, data, y, f, item)
+    return at(data, model[item + ITEM.RECORD])
 
 
-def pull_coordinates(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def pull_coordinates(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Apply the tension of a path by its moment arms."""
-    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
+    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     for k in range(i[COUNT]):
         freedom = i[COORDINATES + k]
         if freedom >= 0:
-            f[s[MODEL.DOFS] + freedom] += result[ARMS + k] * result[TENSION]
+            f[model[MODEL.DOFS] + freedom] += result[ARMS + k] * result[TENSION]
     return OUTCOME.OK
 
 
-def function_of_one(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def function_of_one(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Of a function of one argument, by its table."""
-    i, p, result = at(s, item), at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
+    i, p, result = at(model, item), at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     place = i[ARGUMENTS]
     result[0], result[DERIVATIVES], _ = value_at(at(p, 1), y[place] if place >= 0 else p[0])
     return OUTCOME.OK
 
 
-def polynomial(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def polynomial(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Of a MultivariatePolynomialFunction.
 
     The terms are sorted by the power of the first argument, then of the next. In the record stand, after the
     derivatives, the powers of each argument, which powers the term has, and its factors up to each argument.
     """
-    i, p, result = at(s, item), at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
+    i, p, result = at(model, item), at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     size, width = i[SIZE], i[ORDER] + 1
     powers = at(result, DERIVATIVES + size)
     exponents, factors = at(powers, size * width), at(powers, size * width + size)
@@ -112,13 +112,13 @@ def polynomial(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
     return OUTCOME.OK
 
 
-def formula(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def formula(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Value and derivatives of an ExpressionBasedFunction.
 
     After its arguments stand the programs of the value and of the derivatives, if these are asked for: the count of
     steps, the place of the constants, and the steps. The registers are in the record.
     """
-    i, p, result = at(s, item), at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
+    i, p, result = at(model, item), at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     size = i[SIZE]
     program, registers = at(i, ARGUMENTS + size), at(result, DERIVATIVES + size)
     for number in range(i[ORDER]):

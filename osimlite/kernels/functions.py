@@ -55,40 +55,40 @@ def pieces_at(table: Floats, z: float, kind: int) -> tuple[float, float, float]:
     return value, slope, slope if kind == PIECES_OF_OPENSIM else 2.0 * curvature
 
 
-def amount_by_one(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
+def amount_by_one(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Amount of an operation by a function of one coordinate, with its derivatives."""
     j, a = (
-        operation_ints(s, operation),
-        operation_work(s, w, operation),
+        operation_ints(model, operation),
+        operation_work(model, data, operation),
     )
-    freedom = s[j[OPERATION.ARGUMENTS]]
+    freedom = model[j[OPERATION.ARGUMENTS]]
     value, slope, curvature = value_at(
-        at(x, j[OPERATION.EXTRA] + 1), y[freedom] if freedom >= 0 else x[j[OPERATION.EXTRA]]
+        at(reals, j[OPERATION.EXTRA] + 1), y[freedom] if freedom >= 0 else reals[j[OPERATION.EXTRA]]
     )
-    speed = y[s[MODEL.DOFS] + freedom] if freedom >= 0 else 0.0
+    speed = y[model[MODEL.DOFS] + freedom] if freedom >= 0 else 0.0
     a[OPERATION_WORK.AMOUNT], a[OPERATION_WORK.RATE], a[OPERATION_WORK.CURVATURE] = (
         value,
         slope * speed,
         curvature * speed * speed,
     )
-    w[j[OPERATION.GRADIENT]] = slope
+    data[j[OPERATION.GRADIENT]] = slope
     return OUTCOME.OK
 
 
-def amount_by_several(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, operation: int) -> int:
+def amount_by_several(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
     """Amount of an operation by a polynomial of several coordinates, with its derivatives."""
     j, a = (
-        operation_ints(s, operation),
-        operation_work(s, w, operation),
+        operation_ints(model, operation),
+        operation_work(model, data, operation),
     )
     size, arguments, constants, gradient = (
         j[OPERATION.ARGUMENT_COUNT],
-        at(s, j[OPERATION.ARGUMENTS]),
-        at(x, j[OPERATION.EXTRA]),
-        at(w, j[OPERATION.GRADIENT]),
+        at(model, j[OPERATION.ARGUMENTS]),
+        at(reals, j[OPERATION.EXTRA]),
+        at(data, j[OPERATION.GRADIENT]),
     )
     a[OPERATION_WORK.AMOUNT], a[OPERATION_WORK.RATE], a[OPERATION_WORK.CURVATURE] = several_at(
-        size, arguments, constants, y, at(y, s[MODEL.DOFS]), gradient
+        size, arguments, constants, y, at(y, model[MODEL.DOFS]), gradient
     )
     return OUTCOME.OK
 

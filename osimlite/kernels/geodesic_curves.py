@@ -31,9 +31,9 @@ from osimlite.kernels.pointers import Floats, Ints, at
 from osimlite.kernels.wrap_curves import pieces
 
 
-def trace_geodesics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def trace_geodesics(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Write all corners of a path that was measured into f, in ground; returns how many there are."""
-    i, p, result = at(s, item), at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
+    i, p, result = at(model, item), at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     points, wraps = i[POINTS], at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * i[WRAPS]))
     order, work = at(result, ORDER), at(result, ORDER + points + 2 * i[WRAPS])
     slots = at(wraps, WRAP_INTS * i[WRAPS])
@@ -57,9 +57,9 @@ def trace_geodesics(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: i
     return count
 
 
-def trace_cable(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """The same of a cable."""
-    i, p, result = at(s, item), at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
+    i, p, result = at(model, item), at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     count = 0
     for k in range(i[CABLE_COUNT]):
         element = at(i, ELEMENTS + ELEMENT_INTS * k)

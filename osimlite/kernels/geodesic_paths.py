@@ -110,14 +110,14 @@ def slots_and_room(most: int, wraps: int, room: int) -> tuple[list[int], int]:
     return [room, best, search, poses], poses + POSE_NUMBERS * wraps
 
 
-def geodesic_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Length and speed of a path with wraps."""
-    place_points(s, x, w, y, item)
-    i, p = at(s, item), at(x, s[item + ITEM.NUMBERS])
-    result, points, size = at(w, i[ITEM.RECORD]), i[POINTS], i[POINTS] + 2 * i[WRAPS]
+    place_points(model, reals, data, y, item)
+    i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
+    result, points, size = at(data, i[ITEM.RECORD]), i[POINTS], i[POINTS] + 2 * i[WRAPS]
     order, work = at(result, ORDER), at(result, ORDER + size)
     slots = at(i, NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS])
-    place_surfaces(s, w, i, p)
+    place_surfaces(model, data, i, p)
     for k in range(1, int(result[COUNT])):
         find_near(i, p, result, slots, int(order[k - 1]), int(order[k]))
     for k in range(int(result[COUNT]) - 2, -1, -1):
@@ -135,18 +135,18 @@ def geodesic_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int
             one[SURFACE_LENGTH], two[SURFACE_LENGTH] = 0.0, slot[GEODESIC + ARC]
             one[IS_KEPT] = two[IS_KEPT] = 0.0
             order[k + 2 * number + 1], order[k + 2 * number + 2] = node, node + 1
-    measure_points(s, w, y, item)
+    measure_points(model, data, y, item)
     return OUTCOME.OK
 
 
-def place_surfaces(s: Ints, w: Floats, i: Ints, p: Floats) -> None:
+def place_surfaces(model: Ints, data: Floats, i: Ints, p: Floats) -> None:
     """Where the surfaces are in ground."""
     size = i[POINTS] + 2 * i[WRAPS]
-    poses = at(w, i[ITEM.RECORD] + i[NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS] + POSES])
+    poses = at(data, i[ITEM.RECORD] + i[NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS] + POSES])
     for number in range(i[WRAPS]):
         node, pose = at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * number)), at(poses, POSE_NUMBERS * number)
         n = at(p, node[AT])
-        place_frame(s, w, node[LINK], at(n, TURN), vector(n, STATION), pose)
+        place_frame(model, data, node[LINK], at(n, TURN), vector(n, STATION), pose)
         pose[HOW] = NOT
 
 

@@ -5,11 +5,11 @@ the last motion of its joint ends. The way from the carrying link to it is a lis
 transform and then one motion, about the z axis or along any axis if it has one. The degrees of freedom are numbered in
 the order of the links, so that what carries stands before what is carried. Whatever pushes is an item.
 
-The integers s say what is connected to what, and where everything is in the other two; the numbers x hold masses,
-places, parameters of forces, in SI units; the work w is what an evaluation leaves behind. Models of one structure
-differ in x only. Spatial vectors stack the angular part over the linear part; velocities, accelerations, inertias and
-wrenches of a link are along the axes of ground and about an origin that stays in ground: the place of the first link of
-its tree, so that no digits are lost far away from ground's own origin.
+The integers `model` say what is connected to what, and where everything is in the other two; the numbers `reals` hold
+masses, places, parameters of forces, in SI units; `data` is what an evaluation leaves behind. Models of one structure
+differ in `reals` only. Spatial vectors stack the angular part over the linear part; velocities, accelerations, inertias
+and wrenches of a link are along the axes of ground and about an origin that stays in ground: the place of the first
+link of its tree, so that no digits are lost far away from ground's own origin.
 """
 
 from __future__ import annotations
@@ -47,22 +47,22 @@ def _names(record: Record) -> tuple[str, ...]:
 
 # Integers: a head with counts and offsets, then records.
 class MODEL(metaclass=Record):
-    """The head of s: counts, and where all else is."""
+    """The head of the model: counts, and where all else is."""
 
     _at = count()
     LINKS, DOFS, ITEMS, CONTACTS = islice(_at, 4)
     """How many there are: links, degrees of freedom, items (forces and the like), contacts."""
     LINK_AT, OPERATION_AT, DOF_AT, ITEM_AT = islice(_at, 4)
-    """Offsets of the records in s; at ITEM_AT are the offsets of the items' records."""
+    """Offsets of the records in the model; at ITEM_AT are the offsets of the items' records."""
     SUMMED, SUMMED_AT = islice(_at, 2)
     """Count and offset of a list of the degrees of freedom whose columns are sums of several."""
     FIXED_AT = next(_at)
-    """Offset in x of the fixed transforms of the operations, by rows and then the translation, and of axes of slides
-    (K, 15), see `FIXED`."""
+    """Offset in reals of the fixed transforms of the operations, by rows and then the translation, and of axes of
+    slides (K, 15), see `FIXED`."""
     WORK_LINK, WORK_OPERATION, WORK_COLUMN, WORK_PIVOT, WORK_CONTACT, WORK_STATE = islice(_at, 6)
-    """Offsets in the work vector w of what is computed for links, operations, columns, pivots, contacts and states."""
+    """Offsets in the data of what is computed for links, operations, columns, pivots, contacts and states."""
     WORK_SIZE = next(_at)
-    """Length of w."""
+    """Length of the data."""
     CONTACT_AT = next(_at)
     """Where the offsets of the records of the pairs stand, by contact."""
     CONSTRAINED = next(_at)
@@ -70,7 +70,7 @@ class MODEL(metaclass=Record):
     STATE_SIZE = next(_at)
     """Length of a state: values, speeds, and auxiliary states."""
     CONTROLS, WORK_CONTROL = islice(_at, 2)
-    """Offset of the record of the controls, 0 if there are none; offset in w of the controls."""
+    """Offset of the record of the controls, 0 if there are none; offset in data of the controls."""
     EQUILIBRIA, EQUILIBRIUM_AT = islice(_at, 2)
     """Count and offset of what can be brought into equilibrium, see `EQUILIBRIUM`."""
     CHAIN = next(_at)
@@ -94,9 +94,9 @@ class OPERATION(metaclass=Record):
     """Integers of an operation, one motion of a joint.
 
     Its motion, the kind of its fixed transform, the degree of freedom that is its amount or -1, the law that gives the
-    amount otherwise or the motion of a ball; offset and number of the arguments in s (degrees of freedom, -1 for a
-    number that does not change); offset in x of the radii, or of the values of such arguments and the table of the
-    function after them; offset in w of the gradient.
+    amount otherwise or the motion of a ball; offset and number of the arguments in the model (degrees of freedom, -1
+    for a number that does not change); offset in reals of the radii, or of the values of such arguments and the table
+    of the function after them; offset in data of the gradient.
     """
 
     MOTION, BEFORE, DOF, FUNCTION, ARGUMENTS, ARGUMENT_COUNT, EXTRA, GRADIENT, SIZE = range(9)
@@ -105,15 +105,15 @@ class OPERATION(metaclass=Record):
 
 
 class DOF(metaclass=Record):
-    """Of a degree of freedom: the next one on the way to ground or -1, offset in w of its row of the mass matrix, and
-    how many there are on the way."""
+    """Of a degree of freedom: the next one on the way to ground or -1, offset in data of its row of the mass matrix,
+    and how many there are on the way."""
 
     ABOVE, ROW, DEPTH, SIZE = range(4)
 
 
 class ITEM(metaclass=Record):
-    """Of an item: address of its kernel, offsets in x and w of what it owns there, number of the first contact of its
-    element, and from OWN on integers of its own. The record of the controls is like one."""
+    """Of an item: address of its kernel, offsets in reals and data of what it owns there, number of the first contact
+    of its element, and from OWN on integers of its own. The record of the controls is like one."""
 
     LAW, NUMBERS, RECORD, FIRST_CONTACT, OWN = range(5)
 
@@ -134,7 +134,8 @@ class RESPONSE(metaclass=Record):
 
 class RUN(metaclass=Record):
     """Of items that are computed one after another: address of the kernel that computes all of them at once, 0 if each
-    is computed by its own; numbers of the first and the end; offset in w of room for curves, see `curves_abreast`."""
+    is computed by its own; numbers of the first and the end; offset in data of room for curves, see
+    `curves_abreast`."""
 
     LAW, FIRST, END, ROOM, SIZE = range(5)
 
@@ -150,9 +151,9 @@ class CONSTRAINED(metaclass=Record):
     """Counts of the equations, of those that bind positions, and of coordinates that are just locked; count of the
     balls, and where the offsets of their arguments stand; count of the numbers of the mass matrix."""
     WORK_ROWS, WORK_ERRORS, WORK_RATES, WORK_DRIFTS = islice(_at, 4)
-    """Offsets in w of G (m, n), of the errors, and of what G u and G udot are to be."""
+    """Offsets in data of G (m, n), of the errors, and of what G u and G udot are to be."""
     WORK_KEPT, WORK_FACTOR, WORK_SYSTEM, WORK_TRIAL = islice(_at, 4)
-    """Offsets in w of scratch: for (m, n) numbers, for a factor of them, for solving, for states."""
+    """Offsets in data of scratch: for (m, n) numbers, for a factor of them, for solving, for states."""
     FACTORISE, MINIMUM_NORM = islice(_at, 2)
     """The laws that factorise equations, and that solve them then."""
     SIZE = next(_at)
@@ -182,14 +183,14 @@ class CHAIN(metaclass=Record):
     their records, of pairs of a joint and a degree of freedom that moves it, of products of two such shares, and of
     links to which the other program gives too much inertia."""
     WORK_JOINTS, WORK_SHARES, ENTRY_AT, END_ENTRY = islice(_at, 4)
-    """Offsets in w: of values, rates, accelerations without udot and forces of all joints and then the mass matrix, of
-    the shares, and of the rows of our own mass matrix and their end."""
+    """Offsets in data: of values, rates, accelerations without udot and forces of all joints and then the mass matrix,
+    of the shares, and of the rows of our own mass matrix and their end."""
     SIZE = next(_at)
 
 
 class JOINT(metaclass=Record):
-    """Of a joint: what it is a part of, number of that degree of freedom or operation, which part or the offset in x of
-    a factor, and its first share."""
+    """Of a joint: what it is a part of, number of that degree of freedom or operation, which part or the offset in
+    reals of a factor, and its first share."""
 
     KIND, SOURCE, PART, FIRST_SHARE, SIZE = range(5)
 
@@ -201,13 +202,14 @@ class SHARE(metaclass=Record):
 
 
 class PRODUCT(metaclass=Record):
-    """Two shares, the entry of the other program's mass matrix that they take, and offset in w of what it adds to."""
+    """Two shares, the entry of the other program's mass matrix that they take, and offset in data of what it adds
+    to."""
 
     ONE, TWO, ENTRY, PLACE, SIZE = range(5)
 
 
 class EXCESS(metaclass=Record):
-    """A link, the last degree of freedom on the way to it, and offset in x of what its inertia is too large by."""
+    """A link, the last degree of freedom on the way to it, and offset in reals of what its inertia is too large by."""
 
     LINK, DOF, NUMBER, SIZE = range(4)
 
@@ -237,7 +239,7 @@ class FIXED(metaclass=Record):
 
 
 class WORK(metaclass=Record):
-    """The head of w: the time (s), and room for what laws hand over."""
+    """The head of the data: the time (s), and room for what laws hand over."""
 
     TIME, SCRATCH, SIZE = accumulate((1, 31), initial=0)
 

@@ -28,30 +28,40 @@ def factor_room(count: int, size: int) -> int:
     return count * size + count * count + FACTOR_EXTRA * count + 1
 
 
-def factored(s: Ints, w: Floats, count: int, a: Floats, smallest: float) -> int:
+def factored(model: Ints, data: Floats, count: int, a: Floats, smallest: float) -> int:
     """Turn equations for all speeds into the factor, see `factorise`; returns how many count."""
-    w[WORK.SCRATCH] = smallest
-    return call(s[MODEL.LAWS + s[s[MODEL.CONSTRAINED] + CONSTRAINED.FACTORISE]], s, w, w, a, a, count)
+    data[WORK.SCRATCH] = smallest
+    return call(
+        model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.FACTORISE]], model, data, data, a, a, count
+    )
 
 
-def solved(s: Ints, count: int, a: Floats, values: Floats, room: Floats, x: Floats) -> None:
+def solved(model: Ints, count: int, a: Floats, values: Floats, room: Floats, reals: Floats) -> None:
     """The shortest x that comes nearest to fulfilling equations that were `factored`, see `minimum_norm`."""
-    call(s[MODEL.LAWS + s[s[MODEL.CONSTRAINED] + CONSTRAINED.MINIMUM_NORM]], s, values, room, a, x, count)
+    call(
+        model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.MINIMUM_NORM]],
+        model,
+        values,
+        room,
+        a,
+        reals,
+        count,
+    )
 
 
-def factorise_law(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int) -> int:
+def factorise_law(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int) -> int:
     """`factorise` for others to call by its address: the factor f, what counts in SCRATCH."""
-    size = s[MODEL.DOFS]
-    rank = factorise(count, size, f, w[WORK.SCRATCH])
+    size = model[MODEL.DOFS]
+    rank = factorise(count, size, f, data[WORK.SCRATCH])
     f[factor_room(count, size) - 1] = rank
     return rank
 
 
-def minimum_norm_law(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int) -> int:
+def minimum_norm_law(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int) -> int:
     """`minimum_norm` for others to call by its address: right sides x, room w, factor y, solution f."""
-    size = s[MODEL.DOFS]
+    size = model[MODEL.DOFS]
     rank = int(y[factor_room(count, size) - 1])
-    minimum_norm(count, size, y, rank, x, w, f)
+    minimum_norm(count, size, y, rank, reals, data, f)
     return rank
 
 

@@ -14,24 +14,24 @@ ORDER = 4.0
 """Of the error."""
 
 
-def merson(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> int:
+def merson(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
     """Try one step from y0, behind which its derivative stands, to y1."""
-    h = at(w, place)
-    errors, stages = at(w, s[MODEL.WORK_STATE] + ERRORS * s[MODEL.STATE_SIZE]), at(h, HEAD)
+    h = at(data, place)
+    errors, stages = at(data, model[MODEL.WORK_STATE] + ERRORS * model[MODEL.STATE_SIZE]), at(h, HEAD)
     t0, t1 = h[REACHED], step_end(h)
     h[EVALUATED], h[HAS_DERIVATIVE] = 4.0, 0.0
     error = inf
-    if staged(s, x, w, t0, t1, y0, y1, errors, stages) == OUTCOME.OK:
-        error = step_error(s, x, w, t1, y0, y1, errors, h, 0)
+    if staged(model, reals, data, t0, t1, y0, y1, errors, stages) == OUTCOME.OK:
+        error = step_error(model, reals, data, t1, y0, y1, errors, h, 0)
     judge(h, t1, error, ORDER)
     return OUTCOME.OK
 
 
 def staged(
-    s: Ints, x: Floats, w: Floats, t0: float, t1: float, y0: Floats, y1: Floats, ya: Floats, stages: Floats
+    model: Ints, reals: Floats, data: Floats, t0: float, t1: float, y0: Floats, y1: Floats, ya: Floats, stages: Floats
 ) -> int:
     """Compute y1 and, in `ya`, its errors."""
-    size, h = s[MODEL.STATE_SIZE], t1 - t0
+    size, h = model[MODEL.STATE_SIZE], t1 - t0
     f0, fa, fb, fc = at(y0, size), stages, at(stages, size), at(stages, 2 * size)
     for stage in range(4):
         # Where the next evaluation is to be.
@@ -54,8 +54,8 @@ def staged(
             c = h / 2.0
             for k in range(size):
                 ya[k] = y0[k] + c * (f0[k] - 3.0 * fb[k] + 4.0 * fc[k])
-        w[WORK.TIME] = t
-        status = call(s[MODEL.LAWS], s, x, w, ya, f, STAGE.ACCELERATION)
+        data[WORK.TIME] = t
+        status = call(model[MODEL.LAWS], model, reals, data, ya, f, STAGE.ACCELERATION)
         if status != OUTCOME.OK:
             return status
     c = h / 6.0

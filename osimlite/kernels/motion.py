@@ -26,18 +26,18 @@ BALL_MOVES = 1
 """How far after the law of a ball (or a drift) that places its link is the one that moves it."""
 
 
-def place(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
+def place(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None:
     """Rotations, positions and origins of all links, axes of all operations."""
-    for link in range(s[MODEL.LINKS]):
-        i, here = link_ints(s, link), link_work(s, w, link)
+    for link in range(model[MODEL.LINKS]):
+        i, here = link_ints(model, link), link_work(model, data, link)
         axes, origin = (X, Y, Z), ZERO
         if i[LINK.PARENT] >= 0:
-            parent = link_work(s, w, i[LINK.PARENT])
+            parent = link_work(model, data, i[LINK.PARENT])
             axes, origin = axes_of(parent), vector(parent, LINK_WORK.POSITION)
         for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
-            record = s[MODEL.OPERATION_AT] + OPERATION.SIZE * operation
-            j, a = at(s, record), operation_work(s, w, operation)
-            b = at(x, s[MODEL.FIXED_AT] + FIXED.SIZE * operation)
+            record = model[MODEL.OPERATION_AT] + OPERATION.SIZE * operation
+            j, a = at(model, record), operation_work(model, data, operation)
+            b = at(reals, model[MODEL.FIXED_AT] + FIXED.SIZE * operation)
             if j[OPERATION.BEFORE] != TRANSFORM.NOTHING:
                 origin = plus(origin, along_axes(axes, vector(b, FIXED.TRANSLATION)))
                 if j[OPERATION.BEFORE] == TRANSFORM.MOVE:
@@ -47,7 +47,7 @@ def place(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
                 if j[OPERATION.DOF] >= 0:
                     amount = y[j[OPERATION.DOF]]
                 else:
-                    call(s[MODEL.LAWS + j[OPERATION.FUNCTION]], s, x, w, y, f, operation)
+                    call(model[MODEL.LAWS + j[OPERATION.FUNCTION]], model, reals, data, y, f, operation)
                     amount = a[OPERATION_WORK.AMOUNT]
                 if motion == MOTION.TURN:
                     one, two, three = axes
@@ -60,13 +60,13 @@ def place(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> None:
                     put(a, OPERATION_WORK.AXIS, axis)
                     origin = along(origin, amount, axis)
             else:
-                frame = at(w, WORK.SCRATCH)
+                frame = at(data, WORK.SCRATCH)
                 set_frame(frame, axes, origin)
-                call(s[MODEL.LAWS + j[OPERATION.FUNCTION]], s, x, w, y, f, operation)
+                call(model[MODEL.LAWS + j[OPERATION.FUNCTION]], model, reals, data, y, f, operation)
                 axes, origin = axes_of(frame), vector(frame, LINK_WORK.POSITION)
         set_frame(here, axes, origin)
         if i[LINK.PARENT] >= 0:
-            origin = vector(link_work(s, w, i[LINK.PARENT]), LINK_WORK.ORIGIN)
+            origin = vector(link_work(model, data, i[LINK.PARENT]), LINK_WORK.ORIGIN)
         put(here, LINK_WORK.ORIGIN, origin)
 
 
@@ -84,33 +84,33 @@ def set_frame(rows: Floats, axes: Axes, origin: Vector) -> None:
     put(rows, LINK_WORK.POSITION, origin)
 
 
-def move(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
+def move(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
     """After `place`: velocities, accelerations without udot, columns of the speeds, rates of coordinates, controls."""
-    status, size, controls = OUTCOME.OK, s[MODEL.DOFS], s[MODEL.CONTROLS]
+    status, size, controls = OUTCOME.OK, model[MODEL.DOFS], model[MODEL.CONTROLS]
     if controls > 0:
-        status = call(s[controls + ITEM.LAW], s, x, w, y, f, controls)
+        status = call(model[controls + ITEM.LAW], model, reals, data, y, f, controls)
     for freedom in range(size):
         f[freedom] = y[size + freedom]
-    for k in range(s[MODEL.SUMMED]):
-        set_row(at(w, s[MODEL.WORK_COLUMN] + 6 * s[s[MODEL.SUMMED_AT] + k]), ZERO, ZERO)
-    for link in range(s[MODEL.LINKS]):
-        i, here = link_ints(s, link), link_work(s, w, link)
+    for k in range(model[MODEL.SUMMED]):
+        set_row(at(data, model[MODEL.WORK_COLUMN] + 6 * model[model[MODEL.SUMMED_AT] + k]), ZERO, ZERO)
+    for link in range(model[MODEL.LINKS]):
+        i, here = link_ints(model, link), link_work(model, data, link)
         origin = vector(here, LINK_WORK.ORIGIN)
         # Links that are pushed upwards move in one another as under gravity.
-        spin, velocity, spin_rate, acceleration = ZERO, ZERO, ZERO, times(-1.0, vector(x, GRAVITY_AT))
+        spin, velocity, spin_rate, acceleration = ZERO, ZERO, ZERO, times(-1.0, vector(reals, GRAVITY_AT))
         if i[LINK.PARENT] >= 0:
-            parent = link_work(s, w, i[LINK.PARENT])
+            parent = link_work(model, data, i[LINK.PARENT])
             spin, velocity = vector(parent, LINK_WORK.VELOCITY), vector(parent, LINK_WORK.VELOCITY + 3)
             spin_rate, acceleration = vector(parent, LINK_WORK.ACCELERATION), vector(parent, LINK_WORK.ACCELERATION + 3)
         for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
-            j = operation_ints(s, operation)
-            a = operation_work(s, w, operation)
+            j = operation_ints(model, operation)
+            a = operation_work(model, data, operation)
             motion, freedom = j[OPERATION.MOTION], j[OPERATION.DOF]
             if motion < MOTION.BALL:
                 turn, shift = screw(j, a, origin)
                 if freedom >= 0:
                     rate = y[size + freedom]
-                    column = at(w, s[MODEL.WORK_COLUMN] + 6 * freedom)
+                    column = at(data, model[MODEL.WORK_COLUMN] + 6 * freedom)
                     if j[OPERATION.FUNCTION] == OPERATION.ALONE:
                         set_row(column, turn, shift)
                     else:
@@ -120,17 +120,23 @@ def move(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats) -> int:
                     spin_rate = along(spin_rate, curvature, turn)
                     acceleration = along(acceleration, curvature, shift)
                     for k in range(j[OPERATION.ARGUMENT_COUNT]):
-                        freedom = s[j[OPERATION.ARGUMENTS] + k]
+                        freedom = model[j[OPERATION.ARGUMENTS] + k]
                         if freedom >= 0:
                             add_row(
-                                at(w, s[MODEL.WORK_COLUMN] + 6 * freedom), w[j[OPERATION.GRADIENT] + k], turn, shift
+                                at(data, model[MODEL.WORK_COLUMN] + 6 * freedom),
+                                data[j[OPERATION.GRADIENT] + k],
+                                turn,
+                                shift,
                             )
                 turn, shift = times(rate, turn), times(rate, shift)
             else:
                 # The origin goes to the law, and what it finds comes back.
-                result = at(w, WORK.SCRATCH)
+                result = at(data, WORK.SCRATCH)
                 put(result, 0, origin)
-                status = max(status, call(s[MODEL.LAWS + j[OPERATION.FUNCTION] + BALL_MOVES], s, x, w, y, f, operation))
+                status = max(
+                    status,
+                    call(model[MODEL.LAWS + j[OPERATION.FUNCTION] + BALL_MOVES], model, reals, data, y, f, operation),
+                )
                 turn, shift = vector(result, 0), vector(result, 3)
                 acceleration, spin_rate = plus(acceleration, vector(result, 6)), plus(spin_rate, vector(result, 9))
             # The axes are carried around by what moved before.

@@ -70,25 +70,29 @@ PATIENCE = 3
 """So many refused steps in turn and the history is dropped: something has changed abruptly."""
 
 
-def bdf(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> int:
+def bdf(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
     """Try one step from y0, behind which its derivative stands, to y1, which its derivative is put behind."""
-    return multistep(s, x, w, y0, y1, place, BDF)
+    return multistep(model, reals, data, y0, y1, place, BDF)
 
 
-def adams(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> int:
+def adams(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
     """The same by the other method."""
-    return multistep(s, x, w, y0, y1, place, ADAMS)
+    return multistep(model, reals, data, y0, y1, place, ADAMS)
 
 
-def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int, method: int) -> int:
+def multistep(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int, method: int) -> int:
     """The same by either: BDF or ADAMS."""
-    size = s[MODEL.STATE_SIZE]
-    h = at(w, place)
+    size = model[MODEL.STATE_SIZE]
+    h = at(data, place)
     rows, room = at(h, HEAD), at(h, HEAD + STATES * size)
-    d, psi, errors = at(rows, ROWS * size), at(rows, (ROWS + 1) * size), at(w, s[MODEL.WORK_STATE] + ERRORS * size)
+    d, psi, errors = (
+        at(rows, ROWS * size),
+        at(rows, (ROWS + 1) * size),
+        at(data, model[MODEL.WORK_STATE] + ERRORS * size),
+    )
     h[EVALUATED], h[HAS_DERIVATIVE] = 0.0, 1.0
     if h[ORDER] == 0.0:
-        begin(s, h, y0, rows)
+        begin(model, h, y0, rows)
     t0, accuracy, order = h[REACHED], h[ACCEPTED], int(h[ORDER])
     t1 = t0 + h[STEP]
     if h[LAST_TIME] <= t0 + 1.001 * h[STEP]:
@@ -100,12 +104,12 @@ def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int,
     while True:
         predict(size, method, order, rows, y1, psi)
         if h[AGE] <= 0.0 or h[AGE] > RENEWED:
-            w[WORK.TIME] = t1
-            is_new = linearise(s, x, w, y1, at(y1, size), room, 0.0) == OUTCOME.OK
+            data[WORK.TIME] = t1
+            is_new = linearise(model, reals, data, y1, at(y1, size), room, 0.0) == OUTCOME.OK
             h[AGE], h[CONDENSED] = 1.0 if is_new else 0.0, 0.0
-        if h[AGE] > 0.0 and (h[CONDENSED] == c or condense(s, c, room)):
+        if h[AGE] > 0.0 and (h[CONDENSED] == c or condense(model, c, room)):
             h[CONDENSED] = c
-            iterations = newton(s, x, w, t1, c, y0, y1, d, psi, errors, room, h)
+            iterations = newton(model, reals, data, t1, c, y0, y1, d, psi, errors, room, h)
         if iterations > 0 or is_new or h[AGE] <= 0.0:
             break
         h[AGE] = 0.0
@@ -113,7 +117,7 @@ def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int,
     if iterations > 0:
         for k in range(size):
             errors[k] = ERROR_CONSTANT[constants] * DIFFERENCE[constants] * d[k]
-        error = step_error(s, x, w, t1, y0, y1, errors, h, 1)
+        error = step_error(model, reals, data, t1, y0, y1, errors, h, 1)
     if not error <= accuracy:
         refuse(size, method, h, rows, error / accuracy)
         return OUTCOME.OK
@@ -135,15 +139,15 @@ def multistep(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int,
         rows[k] = y1[k]
     h[EQUAL] += 1.0
     if h[EQUAL] > order:
-        choose(s, method, h, y0, rows, errors, error, SAFETY * (2 * ITERATIONS + 1) / (2 * ITERATIONS + iterations))
+        choose(model, method, h, y0, rows, errors, error, SAFETY * (2 * ITERATIONS + 1) / (2 * ITERATIONS + iterations))
     h[NEXT_STEP] = h[STEP]
     return OUTCOME.OK
 
 
-def begin(s: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
+def begin(model: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
     """Start with order 1, and a step that changes little."""
-    size = s[MODEL.STATE_SIZE]
-    speed = error_norm(s, y0, at(y0, size), h, 1)
+    size = model[MODEL.STATE_SIZE]
+    speed = error_norm(model, y0, at(y0, size), h, 1)
     h[STEP] = min(h[NEXT_STEP], 0.1 * sqrt(h[ACCEPTED]) / max(speed, 1.0))
     h[ORDER], h[EQUAL], h[AGE], h[REFUSED] = 1.0, 0.0, 0.0, 0.0
     for k in range(size):
@@ -165,9 +169,9 @@ def predict(size: int, method: int, order: int, rows: Floats, y: Floats, psi: Fl
 
 
 def newton(
-    s: Ints,
-    x: Floats,
-    w: Floats,
+    model: Ints,
+    reals: Floats,
+    data: Floats,
     t: float,
     c: float,
     y0: Floats,
@@ -182,19 +186,21 @@ def newton(
 
     None if they do not converge.
     """
-    size, f1, rest, before = s[MODEL.STATE_SIZE], at(y1, s[MODEL.STATE_SIZE]), 0.0, 0.0
+    size, f1, rest, before = model[MODEL.STATE_SIZE], at(y1, model[MODEL.STATE_SIZE]), 0.0, 0.0
     for k in range(size):
         d[k] = 0.0
     for iteration in range(ITERATIONS):
         h[EVALUATED] += 1.0
-        w[WORK.TIME] = t
-        if call(s[MODEL.LAWS], s, x, w, y1, f1, STAGE.ACCELERATION) != OUTCOME.OK or not is_finite(size, f1):
+        data[WORK.TIME] = t
+        if call(model[MODEL.LAWS], model, reals, data, y1, f1, STAGE.ACCELERATION) != OUTCOME.OK or not is_finite(
+            size, f1
+        ):
             return 0
         for k in range(size):
             step[k] = c * f1[k] - psi[k] - d[k]
-        residual = error_norm(s, y0, step, h, 1)
-        correct(s, c, room, step)
-        length = error_norm(s, y0, step, h, 1)
+        residual = error_norm(model, y0, step, h, 1)
+        correct(model, c, room, step)
+        length = error_norm(model, y0, step, h, 1)
         for k in range(size):
             y1[k] += step[k]
             d[k] += step[k]
@@ -224,17 +230,17 @@ def refuse(size: int, method: int, h: Floats, rows: Floats, excess: float) -> No
 
 
 def choose(
-    s: Ints, method: int, h: Floats, y0: Floats, rows: Floats, errors: Floats, error: float, safety: float
+    model: Ints, method: int, h: Floats, y0: Floats, rows: Floats, errors: Floats, error: float, safety: float
 ) -> None:
     """Choose order and step for the next steps."""
-    size, order, accuracy = s[MODEL.STATE_SIZE], int(h[ORDER]), h[ACCEPTED]
+    size, order, accuracy = model[MODEL.STATE_SIZE], int(h[ORDER]), h[ACCEPTED]
     best, factor = order, reach(error / accuracy, order)
     for other in (order - 1, order + 1):
         if not 1 <= other <= MOST_ORDER[method]:
             continue
         for k in range(size):
             errors[k] = ERROR_CONSTANT[WIDTH * method + other] * rows[size * (other + 1) + k]
-        result = reach(error_norm(s, y0, errors, h, 1) / accuracy, other)
+        result = reach(error_norm(model, y0, errors, h, 1) / accuracy, other)
         if result > factor:
             best, factor = other, result
     factor = min(safety * factor, GROW)

@@ -1,4 +1,5 @@
-"""The records of a link and of an operation: their integers in s, and what an evaluation leaves of them in w."""
+"""The records of a link and of an operation: their integers in the model, and what an
+evaluation leaves of them in the data."""
 
 from __future__ import annotations
 
@@ -7,24 +8,24 @@ from osimlite.kernels.layout import LINK, LINK_WORK, MODEL, MOTION, OPERATION, O
 from osimlite.kernels.pointers import Floats, Ints, at
 
 
-def link_ints(s: Ints, link: int) -> Ints:
+def link_ints(model: Ints, link: int) -> Ints:
     """Integers of a link, see `LINK`."""
-    return at(s, s[MODEL.LINK_AT] + LINK.SIZE * link)
+    return at(model, model[MODEL.LINK_AT] + LINK.SIZE * link)
 
 
-def link_work(s: Ints, w: Floats, link: int) -> Floats:
+def link_work(model: Ints, data: Floats, link: int) -> Floats:
     """Work of a link, see `LINK_WORK`."""
-    return at(w, s[MODEL.WORK_LINK] + LINK_WORK.SIZE * link)
+    return at(data, model[MODEL.WORK_LINK] + LINK_WORK.SIZE * link)
 
 
-def operation_ints(s: Ints, operation: int) -> Ints:
+def operation_ints(model: Ints, operation: int) -> Ints:
     """Integers of an operation, see `OPERATION`."""
-    return at(s, s[MODEL.OPERATION_AT] + OPERATION.SIZE * operation)
+    return at(model, model[MODEL.OPERATION_AT] + OPERATION.SIZE * operation)
 
 
-def operation_work(s: Ints, w: Floats, operation: int) -> Floats:
+def operation_work(model: Ints, data: Floats, operation: int) -> Floats:
     """Work of an operation, see `OPERATION_WORK`."""
-    return at(w, s[MODEL.WORK_OPERATION] + OPERATION_WORK.SIZE * operation)
+    return at(data, model[MODEL.WORK_OPERATION] + OPERATION_WORK.SIZE * operation)
 
 
 def screw(j: Ints, a: Floats, origin: Vector) -> tuple[Vector, Vector]:

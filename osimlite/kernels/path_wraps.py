@@ -76,52 +76,52 @@ has found, from FIRST_TANGENT on, for the piece that is bent."""
 SURFACE_WORK = BEST + ROOM - FIRST_TANGENT
 
 
-def wrapped_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Length and speed of a path with wraps."""
-    place_points(s, x, w, y, item)
-    place_surfaces(s, x, w, item)
-    wraps, length, exchanged = s[item + WRAPS], inf, False
+    place_points(model, reals, data, y, item)
+    place_surfaces(model, reals, data, item)
+    wraps, length, exchanged = model[item + WRAPS], inf, False
     for turn in range(ROUNDS if wraps > 1 else 1):
         first = second = NONE
         for k in range(wraps):
-            result = wrap(s, x, w, y, f, item, 1 - k if exchanged and k < 2 else k)
+            result = wrap(model, reals, data, y, f, item, 1 - k if exchanged and k < 2 else k)
             if result == NOWHERE:
-                measure_points(s, w, y, item)
+                measure_points(model, data, y, item)
                 return OUTCOME.OK
             if result == BEYOND:
-                record = at(w, s[item + ITEM.RECORD])
+                record = at(data, model[item + ITEM.RECORD])
                 record[LENGTH] = record[SPEED] = nan
                 return OUTCOME.UNSOLVED
             if k == 0:
                 first = result
             elif k == 1:
                 second = result
-        before, length = length, measure_points(s, w, y, item)
+        before, length = length, measure_points(model, data, y, item)
         if abs(length - before) < STILL:
             break
         if turn == 0 and wraps > 1 and first == NONE and second == INSIDE:
             exchanged = True
-            take_out(s, w, item, 0)
+            take_out(model, data, item, 0)
     return OUTCOME.OK
 
 
-def place_surfaces(s: Ints, x: Floats, w: Floats, item: int) -> None:
+def place_surfaces(model: Ints, reals: Floats, data: Floats, item: int) -> None:
     """Where the surfaces are; no tangent point is known."""
-    i, p = at(s, item), at(x, s[item + ITEM.NUMBERS])
-    nodes, work = i[POINTS] + 2 * i[WRAPS], at(w, i[ITEM.RECORD] + ORDER + i[POINTS] + 2 * i[WRAPS])
+    i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
+    nodes, work = i[POINTS] + 2 * i[WRAPS], at(data, i[ITEM.RECORD] + ORDER + i[POINTS] + 2 * i[WRAPS])
     for k in range(i[WRAPS]):
         number = i[POINTS] + 2 * k
         at(work, NODE_WORK * number)[IS_KEPT] = at(work, NODE_WORK * (number + 1))[IS_KEPT] = 0.0
         back = i[NODES_AT + NODE_INTS * nodes + WRAP_INTS * k + BACK]
         if back > 0:
-            node, pose = at(i, NODES_AT + NODE_INTS * number), at(w, s[item - back + ITEM.RECORD] + POSE)
+            node, pose = at(i, NODES_AT + NODE_INTS * number), at(data, model[item - back + ITEM.RECORD] + POSE)
             n = at(p, node[AT])
-            place_frame(s, w, node[LINK], at(n, TURN), vector(n, STATION), pose)
+            place_frame(model, data, node[LINK], at(n, TURN), vector(n, STATION), pose)
 
 
-def take_out(s: Ints, w: Floats, item: int, number: int) -> None:
+def take_out(model: Ints, data: Floats, item: int, number: int) -> None:
     """Take the tangent points of a wrap out of the path, if they are in it."""
-    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
+    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     order, count, first = at(result, ORDER), int(result[COUNT]), i[POINTS] + 2 * number
     kept = 0
     for k in range(count):
@@ -131,10 +131,10 @@ def take_out(s: Ints, w: Floats, item: int, number: int) -> None:
     result[COUNT] = kept
 
 
-def wrap(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int, number: int) -> int:
+def wrap(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int, number: int) -> int:
     """Find the way around one surface; returns what became of the last piece that was tried."""
-    take_out(s, w, item, number)
-    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
+    take_out(model, data, item, number)
+    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     points, count = i[POINTS], int(result[COUNT])
     size = points + 2 * i[WRAPS]
     nodes, order, work = at(i, NODES_AT), at(result, ORDER), at(result, ORDER + size)
@@ -144,7 +144,7 @@ def wrap(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int, number:
     if own[FIRST] <= own[LAST] and own[LAST] >= points:
         return BEYOND
     surface = item - own[BACK]
-    e = at(w, s[surface + ITEM.RECORD])
+    e = at(data, model[surface + ITEM.RECORD])
     begin = end = -1
     for k in range(count):
         if own[FIRST] <= order[k] <= own[LAST] and order[k] < points:
@@ -160,7 +160,7 @@ def wrap(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int, number:
             continue
         put(e, FIRST_END, in_surface(at(e, POSE), vector(a, PLACE)))
         put(e, SECOND_END, in_surface(at(e, POSE), vector(b, PLACE)))
-        says = call(s[surface + ITEM.LAW], s, x, w, y, f, surface)
+        says = call(model[surface + ITEM.LAW], model, reals, data, y, f, surface)
         if says < WRAPPED:
             continue
         r1 = in_ground(at(e, POSE), vector(e, FIRST_TANGENT))

@@ -50,35 +50,35 @@ COINCIDENT, SIGNIFICANT = 2.0**-52, 2.0 ** (-52.0 * 7.0 / 8.0)
 there, and nothing here."""
 
 
-def path_length(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, path: int) -> tuple[float, float]:
+def path_length(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, path: int) -> tuple[float, float]:
     """Length and lengthening speed of the path of an item."""
-    call(s[path + ITEM.LAW], s, x, w, y, f, path)
-    return known_length(s, w, path)
+    call(model[path + ITEM.LAW], model, reals, data, y, f, path)
+    return known_length(model, data, path)
 
 
-def known_length(s: Ints, w: Floats, path: int) -> tuple[float, float]:
+def known_length(model: Ints, data: Floats, path: int) -> tuple[float, float]:
     """The same as they were found last."""
-    result = at(w, s[path + ITEM.RECORD])
+    result = at(data, model[path + ITEM.RECORD])
     return result[LENGTH], result[SPEED]
 
 
-def pull_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, path: int, tension: float) -> None:
+def pull_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, path: int, tension: float) -> None:
     """Apply a tension along the path of an item, after its length was found."""
-    w[s[path + ITEM.RECORD] + TENSION] = tension
-    call(s[path - s[path + PULL] + ITEM.LAW], s, x, w, y, f, path)
+    data[model[path + ITEM.RECORD] + TENSION] = tension
+    call(model[path - model[path + PULL] + ITEM.LAW], model, reals, data, y, f, path)
 
 
-def straight_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def straight_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Length and speed of a path without wraps."""
-    place_points(s, x, w, y, item)
-    measure_points(s, w, y, item)
+    place_points(model, reals, data, y, item)
+    measure_points(model, data, y, item)
     return OUTCOME.OK
 
 
-def place_points(s: Ints, x: Floats, w: Floats, y: Floats, item: int) -> None:
+def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int) -> None:
     """Where the points are, and which of them the path runs through."""
-    i, p = at(s, item), at(x, s[item + ITEM.NUMBERS])
-    result = at(w, i[ITEM.RECORD])
+    i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
+    result = at(data, i[ITEM.RECORD])
     order, work = at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
     count = 0
     for number in range(i[POINTS]):
@@ -104,16 +104,16 @@ def place_points(s: Ints, x: Floats, w: Floats, y: Floats, item: int) -> None:
                     _, dy, _ = value_at(at(p, node[TABLES + 1]), value)
                     _, dz, _ = value_at(at(p, node[TABLES + 2]), value)
                 point = plus(point, turned(t, (qx, qy, qz)))
-                put(here, GRADIENT, direction(s, w, node[LINK], turned(t, (dx, dy, dz))))
-        put(here, PLACE, station(s, w, node[LINK], point))
+                put(here, GRADIENT, direction(model, data, node[LINK], turned(t, (dx, dy, dz))))
+        put(here, PLACE, station(model, data, node[LINK], point))
         order[count] = number
         count += 1
     result[COUNT] = count
 
 
-def measure_points(s: Ints, w: Floats, y: Floats, item: int) -> float:
+def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
     """Length, speed and directions, from the places of the nodes that the path runs through; returns the length."""
-    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
+    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     nodes, order, work = at(i, NODES_AT), at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
     length = speed = 0.0
     for k in range(1, int(result[COUNT])):
@@ -127,7 +127,7 @@ def measure_points(s: Ints, w: Floats, y: Floats, item: int) -> float:
         else:
             length += distance
         if m[LINK] != n[LINK] or m[KIND] >= MOVING or n[KIND] >= MOVING:
-            moves = minus(node_velocity(s, w, y, n, b), node_velocity(s, w, y, m, a))
+            moves = minus(node_velocity(model, data, y, n, b), node_velocity(model, data, y, m, a))
             speed += norm(moves) if distance < COINCIDENT else dot(moves, way) / distance
         put(a, ALONG, times(0.0 if distance < SIGNIFICANT else 1.0 / distance, way))
     result[LENGTH], result[SPEED] = length, speed
@@ -144,20 +144,20 @@ def spot(node: Ints, here: Floats) -> Vector:
     return vector(here, KEPT)
 
 
-def node_velocity(s: Ints, w: Floats, y: Floats, node: Ints, here: Floats) -> Vector:
+def node_velocity(model: Ints, data: Floats, y: Floats, node: Ints, here: Floats) -> Vector:
     """Velocity of a node; tangent points move with the body of their surface."""
-    v = velocity(s, w, node[LINK], vector(here, PLACE))
+    v = velocity(model, data, node[LINK], vector(here, PLACE))
     if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
-        return along(v, y[s[MODEL.DOFS] + node[OF]], vector(here, GRADIENT))
+        return along(v, y[model[MODEL.DOFS] + node[OF]], vector(here, GRADIENT))
     return v
 
 
-def pull_points(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def pull_points(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Pull at the nodes of a path, along every line between two bodies.
 
     A moving point works on its coordinate too.
     """
-    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
+    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     nodes, order, work = at(i, NODES_AT), at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
     tension, last = result[TENSION], int(result[COUNT]) - 1
     pull = 0.0, 0.0, 0.0
@@ -168,28 +168,30 @@ def pull_points(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) 
         if k < last and nodes[NODE_INTS * int(order[k + 1]) + BODY] != node[BODY]:
             pull = times(tension, vector(here, ALONG))
         force = minus(pull, back)
-        apply_force(s, w, node[LINK], vector(here, PLACE), force)
+        apply_force(model, data, node[LINK], vector(here, PLACE), force)
         if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
-            f[s[MODEL.DOFS] + node[OF]] += dot(force, vector(here, GRADIENT))
+            f[model[MODEL.DOFS] + node[OF]] += dot(force, vector(here, GRADIENT))
     return OUTCOME.OK
 
 
-def pull_each(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, count: int, states: Floats, forces: Floats) -> int:
+def pull_each(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int, states: Floats, forces: Floats
+) -> int:
     """The generalized forces of 1 N along each item, all of which are paths, in a row each, state by state."""
-    size, items = s[MODEL.DOFS], s[MODEL.ITEMS]
+    size, items = model[MODEL.DOFS], model[MODEL.ITEMS]
     applied = at(f, size)
     for row in range(count):
-        for k in range(s[MODEL.STATE_SIZE]):
-            y[k] = states[s[MODEL.STATE_SIZE] * row + k]
-        status = call(s[MODEL.LAWS], s, x, w, y, f, STAGE.FORCE)
+        for k in range(model[MODEL.STATE_SIZE]):
+            y[k] = states[model[MODEL.STATE_SIZE] * row + k]
+        status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.FORCE)
         if status != OUTCOME.OK:
             return status
         for number in range(items):
-            clear_wrenches(s, w)
+            clear_wrenches(model, data)
             for k in range(size):
                 applied[k] = 0.0
-            pull_path(s, x, w, y, f, s[s[MODEL.ITEM_AT] + number], 1.0)
-            generalized_forces(s, w, applied)
+            pull_path(model, reals, data, y, f, model[model[MODEL.ITEM_AT] + number], 1.0)
+            generalized_forces(model, data, applied)
             for k in range(size):
                 forces[size * (items * row + number) + k] = applied[k]
     return OUTCOME.OK

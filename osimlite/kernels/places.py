@@ -9,14 +9,22 @@ from osimlite.kernels.points import direction, station
 
 
 def contact_places(
-    s: Ints, vectors: Floats, w: Floats, each: int, rows: Ints, states: Floats, room: Floats, places: Floats, count: int
+    model: Ints,
+    vectors: Floats,
+    data: Floats,
+    each: int,
+    rows: Ints,
+    states: Floats,
+    room: Floats,
+    places: Floats,
+    count: int,
 ) -> int:
     """Centres of the surfaces of all contacts at many states.
 
     Args:
-        s: the mechanism.
+        model: the mechanism.
         vectors: its numbers, one row or several.
-        w: room for an evaluation.
+        data: room for an evaluation.
         each: length of a row of numbers.
         rows: which of them each state goes with (k,).
         states: (k, y).
@@ -24,14 +32,14 @@ def contact_places(
         places: filled with the centre of surface 1, its normal, and the centre of surface 2, in ground (k, P, 9).
         count: k.
     """
-    pairs, size = s[MODEL.CONTACTS], s[MODEL.STATE_SIZE]
+    pairs, size = model[MODEL.CONTACTS], model[MODEL.STATE_SIZE]
     for k in range(count):
         x = at(vectors, each * rows[k])
-        call(s[MODEL.LAWS], s, x, w, at(states, size * k), room, STAGE.POSITION)
+        call(model[MODEL.LAWS], model, x, data, at(states, size * k), room, STAGE.POSITION)
         for pair in range(pairs):
-            i, to = at(s, s[s[MODEL.CONTACT_AT] + pair]), at(places, 9 * (pairs * k + pair))
+            i, to = at(model, model[model[MODEL.CONTACT_AT] + pair]), at(places, 9 * (pairs * k + pair))
             a, one, two = at(x, i[ITEM.NUMBERS]), i[ITEM.OWN], i[ITEM.OWN + 1]
-            put(to, 0, station(s, w, one, vector(a, 0)))
-            put(to, 3, direction(s, w, one, vector(a, 3)))
-            put(to, 6, station(s, w, two, vector(a, 7)))
+            put(to, 0, station(model, data, one, vector(a, 0)))
+            put(to, 3, direction(model, data, one, vector(a, 3)))
+            put(to, 6, station(model, data, two, vector(a, 7)))
     return OUTCOME.OK

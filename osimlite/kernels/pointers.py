@@ -39,6 +39,6 @@ def at(vector: Vector, place: int) -> Vector:
     return vector[place:]
 
 
-def call(address: int, s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, place: int) -> int:
+def call(address: int, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, place: int) -> int:
     """Call the law at an address."""
-    return laws[address](s, x, w, y, f, place)
+    return laws[address](model, reals, data, y, f, place)

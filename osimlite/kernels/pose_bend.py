@@ -58,35 +58,35 @@ def bend_joint(m: Fit, y: Floats, link: int, load: Floats, turned: Floats) -> No
 
 def bend_axis(m: Fit, y: Floats, number: int, pull: float) -> None:
     """What the function of one axis makes of the second derivative."""
-    s, size, bend = m.s, m.s[MODEL.DOFS], at(m.v, m.p[BEND])
+    model, size, bend = m.model, m.model[MODEL.DOFS], at(m.v, m.p[BEND])
     axis = axis_of(m, number)
-    j = operation_ints(s, axis[0])
-    first = s[j[OPERATION.ARGUMENTS]] if j[OPERATION.ARGUMENT_COUNT] > 0 else -1
+    j = operation_ints(model, axis[0])
+    first = model[j[OPERATION.ARGUMENTS]] if j[OPERATION.ARGUMENT_COUNT] > 0 else -1
     if axis[1] >= SLIDES:
-        second, part = s[j[OPERATION.ARGUMENTS] + 1], axis[1] - SLIDES
+        second, part = model[j[OPERATION.ARGUMENTS] + 1], axis[1] - SLIDES
         s1, c1 = sine_cosine(y[first])
         s2, c2 = sine_cosine(y[second])
-        far = pull * m.x[j[OPERATION.EXTRA] + part]
+        far = pull * m.reals[j[OPERATION.EXTRA] + part]
         both = far * component((0.0, c1 * s2, s1 * s2), part)
         bend[size * first + first] += far * component((0.0, s1 * c2, -c1 * c2), part)
         bend[size * first + second] += both
         bend[size * second + first] += both
         bend[size * second + second] += far * component((-s2, s1 * c2, -c1 * c2), part)
     elif axis[1] < 0 and j[OPERATION.DOF] < 0 and j[OPERATION.ARGUMENT_COUNT] == 1 and first >= 0:
-        bend[size * first + first] += pull * operation_work(s, m.w, axis[0])[OPERATION_WORK.CURVATURE]
+        bend[size * first + first] += pull * operation_work(model, m.data, axis[0])[OPERATION_WORK.CURVATURE]
 
 
 def axis_of(m: Fit, number: int) -> Ints:
     """The operation of an axis, and which part of a ball it is."""
-    return at(m.p, m.p[AXES_AT] + m.s[MODEL.LINKS] + 1 + 2 * number)
+    return at(m.p, m.p[AXES_AT] + m.model[MODEL.LINKS] + 1 + 2 * number)
 
 
 def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vector]:
     """The motion of a unit of one axis of a link."""
-    s, w, axis = m.s, m.w, axis_of(m, number)
+    model, data, axis = m.model, m.data, axis_of(m, number)
     j, a = (
-        operation_ints(s, axis[0]),
-        operation_work(s, w, axis[0]),
+        operation_ints(model, axis[0]),
+        operation_work(model, data, axis[0]),
     )
     around, center = vector(a, OPERATION_WORK.AXIS), vector(a, OPERATION_WORK.POINT)
     if axis[1] >= SLIDES:
@@ -94,17 +94,17 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
         sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
         return ZERO, times(sign, (a[part], a[3 + part], a[6 + part]))
     if axis[1] >= 0:
-        around = vector(w, s[MODEL.WORK_COLUMN] + 6 * s[j[OPERATION.ARGUMENTS] + axis[1]])
-        far = elementwise(vector(m.x, j[OPERATION.EXTRA]), last_axis(y, at(s, j[OPERATION.ARGUMENTS])))
+        around = vector(data, model[MODEL.WORK_COLUMN] + 6 * model[j[OPERATION.ARGUMENTS] + axis[1]])
+        far = elementwise(vector(m.reals, j[OPERATION.EXTRA]), last_axis(y, at(model, j[OPERATION.ARGUMENTS])))
         center = plus(center, turned_by(a, far))
     elif j[OPERATION.MOTION] != MOTION.TURN:
         return ZERO, around
-    return around, cross(minus(center, vector(link_work(s, w, link), LINK_WORK.ORIGIN)), around)
+    return around, cross(minus(center, vector(link_work(model, data, link), LINK_WORK.ORIGIN)), around)
 
 
 def spread(m: Fit, y: Floats, one: int, two: int, amount: float) -> None:
     """Add to the second derivative a multiple of what a pair of axes is to all pairs of coordinates."""
-    size, bend = m.s[MODEL.DOFS], at(m.v, m.p[BEND])
+    size, bend = m.model[MODEL.DOFS], at(m.v, m.p[BEND])
     for k in range(arguments_of(m, one)):
         first, gain = argument(m, y, one, k)
         if first < 0:
@@ -117,8 +117,8 @@ def spread(m: Fit, y: Floats, one: int, two: int, amount: float) -> None:
 
 def arguments_of(m: Fit, number: int) -> int:
     """How many coordinates an axis goes by."""
-    s, axis = m.s, axis_of(m, number)
-    j = operation_ints(s, axis[0])
+    model, axis = m.model, axis_of(m, number)
+    j = operation_ints(model, axis[0])
     if axis[1] >= SLIDES:
         return 2
     return 1 if axis[1] >= 0 or j[OPERATION.DOF] >= 0 else j[OPERATION.ARGUMENT_COUNT]
@@ -126,16 +126,16 @@ def arguments_of(m: Fit, number: int) -> int:
 
 def argument(m: Fit, y: Floats, number: int, k: int) -> tuple[int, float]:
     """A coordinate that an axis goes by, and how far it goes by a unit of it."""
-    s, axis = m.s, axis_of(m, number)
-    j = operation_ints(s, axis[0])
+    model, axis = m.model, axis_of(m, number)
+    j = operation_ints(model, axis[0])
     if axis[1] >= SLIDES:
         part = axis[1] - SLIDES
-        s1, c1 = sine_cosine(y[s[j[OPERATION.ARGUMENTS]]])
-        s2, c2 = sine_cosine(y[s[j[OPERATION.ARGUMENTS] + 1]])
+        s1, c1 = sine_cosine(y[model[j[OPERATION.ARGUMENTS]]])
+        s2, c2 = sine_cosine(y[model[j[OPERATION.ARGUMENTS] + 1]])
         slope = (0.0, -c1 * c2, -s1 * c2) if k == 0 else (c2, s1 * s2, -c1 * s2)
-        return s[j[OPERATION.ARGUMENTS] + k], m.x[j[OPERATION.EXTRA] + part] * component(slope, part)
+        return model[j[OPERATION.ARGUMENTS] + k], m.reals[j[OPERATION.EXTRA] + part] * component(slope, part)
     if axis[1] >= 0:
-        return s[j[OPERATION.ARGUMENTS] + axis[1]], 1.0
+        return model[j[OPERATION.ARGUMENTS] + axis[1]], 1.0
     if j[OPERATION.DOF] >= 0:
         return j[OPERATION.DOF], 1.0
-    return s[j[OPERATION.ARGUMENTS] + k], m.w[j[OPERATION.GRADIENT] + k]
+    return model[j[OPERATION.ARGUMENTS] + k], m.data[j[OPERATION.GRADIENT] + k]

@@ -44,7 +44,7 @@ ASIDE = 1e-5
 
 def settle(m: Fit, y: Floats) -> bool:
     """Bring a pose into the ranges, to the values that are given, and to where couplers and equations hold."""
-    p, c, v, size = m.p, m.c, m.v, m.s[MODEL.DOFS]
+    p, c, v, size = m.p, m.c, m.v, m.model[MODEL.DOFS]
     ranges, resolved = at(c, p[RANGES_AT]), at(p, p[RESOLVED_AT])
     for k in range(size):
         if resolved[k] == VARIABLE or resolved[k] >= AT_END:
@@ -58,7 +58,7 @@ def settle(m: Fit, y: Floats) -> bool:
 
 def couple_all(m: Fit, y: Floats) -> None:
     """Put what depends on others where these have it."""
-    p, size = m.p, m.s[MODEL.DOFS]
+    p, size = m.p, m.model[MODEL.DOFS]
     for number in range(p[COUPLERS]):
         i = at(p, p[p[COUPLER_AT] + number])
         y[i[DEPENDENT_OF]], _ = coupled(m, i, y, at(m.v, p[ROOM]), at(m.v, p[ROOM] + size))
@@ -66,7 +66,7 @@ def couple_all(m: Fit, y: Floats) -> None:
 
 def restore(m: Fit, y: Floats) -> bool:
     """Bring a pose to where the equations hold, in the shortest steps of what is free; whether they do then."""
-    p, v, size = m.p, m.v, m.s[MODEL.DOFS]
+    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     count, errors, step = equations_of(m), at(v, p[ERRORS]), at(v, p[STEP])
     ranges, before = at(m.c, p[RANGES_AT]), inf
     for _ in range(50):
@@ -100,7 +100,7 @@ def restore(m: Fit, y: Floats) -> bool:
 
 def forget_bends(m: Fit) -> None:
     """Take the equations for straight ones."""
-    size = m.s[MODEL.DOFS]
+    size = m.model[MODEL.DOFS]
     if equations_of(m) > 0:
         for k in range(size * size):
             m.v[m.p[CURVES] + k] = 0.0
@@ -111,7 +111,7 @@ def bend_equations(m: Fit, y: Floats) -> None:
 
     The derivatives are known before, and are not afterwards.
     """
-    p, v, size, count = m.p, m.v, m.s[MODEL.DOFS], equations_of(m)
+    p, v, size, count = m.p, m.v, m.model[MODEL.DOFS], equations_of(m)
     rows, slope, curves = at(v, p[ROWS]), at(v, p[SLOPE]), at(v, p[CURVES])
     pulls, trial = at(curves, size * size), at(v, p[TRIAL])
     free, normal = list_free(m), at(v, p[ROOM] + 2 * size)

@@ -61,18 +61,18 @@ from osimlite.kernels.trigonometry import sine_cosine
 
 def cost(m: Fit, y: Floats) -> float:
     """Cost of a pose, with the gradient and the parts of the second derivative by all free coordinates."""
-    s, w, p, v, size = m.s, m.w, m.p, m.v, m.s[MODEL.DOFS]
+    model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
     look(m, y)
     for k in range(p[BALLS]):
-        turn_by_angles(m, y, at(s, p[p[BALL_AT] + k]))
+        turn_by_angles(m, y, at(model, p[p[BALL_AT] + k]))
     slope, stiffness, bend = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND])
     for k in range(size):
         slope[k] = 0.0
     for k in range(size * size):
         stiffness[k] = bend[k] = 0.0
-    for link in range(s[MODEL.LINKS]):
+    for link in range(model[MODEL.LINKS]):
         here, turned = (
-            at(link_work(s, w, link), LINK_WORK.INERTIA),
+            at(link_work(model, data, link), LINK_WORK.INERTIA),
             at(v, p[TURNED] + 9 * link),
         )
         for k in range(16):
@@ -95,20 +95,20 @@ def cost(m: Fit, y: Floats) -> float:
 
 def look(m: Fit, y: Floats) -> None:
     """Where the links are, what each coordinate moves, and the equations."""
-    s, p, v, size = m.s, m.p, m.v, m.s[MODEL.DOFS]
+    model, p, v, size = m.model, m.p, m.v, m.model[MODEL.DOFS]
     for k in range(size):
         # So that the second derivatives of the functions are those by the coordinates.
         y[size + k] = 1.0
-    call(s[MODEL.LAWS], s, m.x, m.w, y, m.f, STAGE.VELOCITY)
-    if s[MODEL.CONSTRAINED] > 0:
-        bind(s, m.x, m.w, y, m.f)
-        position_errors(s, m.w, at(v, p[ERRORS]))
-        rows_by_values(s, m.w, y, at(v, p[ROWS]))
+    call(model[MODEL.LAWS], model, m.reals, m.data, y, m.f, STAGE.VELOCITY)
+    if model[MODEL.CONSTRAINED] > 0:
+        bind(model, m.reals, m.data, y, m.f)
+        position_errors(model, m.data, at(v, p[ERRORS]))
+        rows_by_values(model, m.data, y, at(v, p[ROWS]))
 
 
 def turn_by_angles(m: Fit, y: Floats, angles: Ints) -> None:
     """Make of the columns of the speeds of a ball those of the rates of its angles."""
-    columns = at(m.w, m.s[MODEL.WORK_COLUMN])
+    columns = at(m.data, m.model[MODEL.WORK_COLUMN])
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
     one, two, three = at(columns, 6 * angles[0]), at(columns, 6 * angles[1]), at(columns, 6 * angles[2])
@@ -120,17 +120,17 @@ def turn_by_angles(m: Fit, y: Floats, angles: Ints) -> None:
 
 def markers_pull(m: Fit) -> float:
     """Put the masses and springs of the markers on the links; what they cost."""
-    s, w, p, v, value = m.s, m.w, m.p, m.v, 0.0
+    model, data, p, v, value = m.model, m.data, m.p, m.v, 0.0
     for k in range(p[MARKERS]):
         weight, link = v[p[WEIGHTS] + k], p[p[MARKER_AT] + k]
         if not weight > 0.0:
             continue
-        point = station(s, w, link, vector(m.c, MARKER_NUMBERS * k))
+        point = station(model, data, link, vector(m.c, MARKER_NUMBERS * k))
         off = minus(point, vector(v, p[MEASURED] + 3 * k))
         value += 0.5 * weight * dot(off, off)
         if link < 0:
             continue
-        here = link_work(s, w, link)
+        here = link_work(model, data, link)
         i, load, turned = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH), at(v, p[TURNED] + 9 * link)
         pull, arm = times(weight, off), minus(point, vector(here, LINK_WORK.ORIGIN))
         a, b, c = arm
@@ -156,11 +156,11 @@ def markers_pull(m: Fit) -> float:
 
 def gather(m: Fit, y: Floats) -> None:
     """Gradient and second derivative by the degrees of freedom, inwards from the leaves."""
-    s, w, p, v, size = m.s, m.w, m.p, m.v, m.s[MODEL.DOFS]
-    freedoms, columns = at(s, s[MODEL.DOF_AT]), at(w, s[MODEL.WORK_COLUMN])
+    model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
+    freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     slope, stiffness, bend = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND])
-    for link in range(s[MODEL.LINKS] - 1, -1, -1):
-        j, here = link_ints(s, link), link_work(s, w, link)
+    for link in range(model[MODEL.LINKS] - 1, -1, -1):
+        j, here = link_ints(model, link), link_work(model, data, link)
         i, load, turned = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH), at(v, p[TURNED] + 9 * link)
         if i[0] > 0.0 or i[4] > 0.0:
             for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
@@ -179,7 +179,7 @@ def gather(m: Fit, y: Floats) -> None:
                     k = freedoms[DOF.SIZE * k + DOF.ABOVE]
             bend_joint(m, y, link, load, turned)
         if j[LINK.PARENT] >= 0:
-            above = at(link_work(s, w, j[LINK.PARENT]), LINK_WORK.INERTIA)
+            above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.INERTIA)
             # The wrench stands behind the inertia.
             for k in range(16):
                 above[k] += i[k]
@@ -190,7 +190,7 @@ def gather(m: Fit, y: Floats) -> None:
 
 def follow_couplers(m: Fit, y: Floats) -> None:
     """Make of the derivatives, and of the equations, those by the coordinates that depend on no others."""
-    p, v, size = m.p, m.v, m.s[MODEL.DOFS]
+    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     slope, stiffness, bend, rows = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND]), at(v, p[ROWS])
     gradient, rates = at(v, p[ROOM]), at(v, p[ROOM] + size)
     for k in range(size):
@@ -219,7 +219,7 @@ def follow_couplers(m: Fit, y: Floats) -> None:
 
 def equations_of(m: Fit) -> int:
     """How many equations bind the positions."""
-    return m.s[m.s[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS] if m.s[MODEL.CONSTRAINED] > 0 else 0
+    return m.model[m.model[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS] if m.model[MODEL.CONSTRAINED] > 0 else 0
 
 
 def coupled(m: Fit, i: Ints, y: Floats, gradient: Floats, rates: Floats) -> tuple[float, float]:

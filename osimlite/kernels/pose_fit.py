@@ -73,15 +73,15 @@ RENEWED = 5
 
 
 def fit_frames(
-    s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, p: Ints, c: Floats, v: Floats, frames: Floats, found: Floats,
-    count: int,
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, p: Ints, c: Floats, v: Floats, frames: Floats,
+    found: Floats, count: int,
 ) -> int:  # fmt: skip
     """Fit some frames, one after the other.
 
     Args:
-        s: the mechanism.
-        x: its numbers.
-        w: its work.
+        model: the mechanism.
+        reals: its numbers.
+        data: its work.
         y: a state, the pose to start from; then the last pose.
         f: room for another.
         p: the integers of the fit.
@@ -94,8 +94,8 @@ def fit_frames(
             of it.
         count: of the frames.
     """
-    m = Fit(s, x, w, f, p, c, v)
-    size, markers, sensors = s[MODEL.DOFS], p[MARKERS], p[SENSORS]
+    m = Fit(model, reals, data, f, p, c, v)
+    size, markers, sensors = model[MODEL.DOFS], p[MARKERS], p[SENSORS]
     width, given = size + 3 * (markers + sensors) + 3, 3 * markers + 9 * sensors + p[GOALS] + p[HELD]
     for number in range(count):
         to = at(found, width * number)
@@ -104,7 +104,10 @@ def fit_frames(
         copy(size, y, to)
         for k in range(markers):
             place = station(
-                s, w, p[p[MARKER_AT] + k], (c[MARKER_NUMBERS * k], c[MARKER_NUMBERS * k + 1], c[MARKER_NUMBERS * k + 2])
+                model,
+                data,
+                p[p[MARKER_AT] + k],
+                (c[MARKER_NUMBERS * k], c[MARKER_NUMBERS * k + 1], c[MARKER_NUMBERS * k + 2]),
             )
             put(to, size + 3 * k, place)
         for k in range(sensors):
@@ -116,7 +119,7 @@ def fit_frames(
 
 def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     """Bring a pose to the best of a frame: its cost, the count of the steps, what became of it."""
-    v, p, size = m.v, m.p, m.s[MODEL.DOFS]
+    v, p, size = m.v, m.p, m.model[MODEL.DOFS]
     history = at(v, p[HISTORY])
     kept, last, trial = int(history[0]), at(history, 1), at(v, p[TRIAL])
     seen = weigh(m)
@@ -189,7 +192,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
 
 def note_pattern(m: Fit, y: Floats) -> None:
     """If other things are seen than in the frame before, find out whether poses look alike, and what moves nothing."""
-    p, v, size = m.p, m.v, m.s[MODEL.DOFS]
+    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     count = p[MARKERS] + p[SENSORS] + p[GOALS]
     weights, pattern, is_new = at(v, p[WEIGHTS]), at(v, p[PATTERN]), False
     for k in range(count):
@@ -214,7 +217,7 @@ def descend_again(
     m: Fit, start: Floats, y: Floats, value: float, status: float, damping: float, lightest: float
 ) -> tuple[float, int, float]:
     """Look for a better pose than the best so far, whose cost is known, from another start; keep the better one."""
-    size = m.s[MODEL.DOFS]
+    size = m.model[MODEL.DOFS]
     best, trial = at(start, size), at(m.v, m.p[TRIAL])
     copy(size, y, best)
     copy(size, start, trial)
@@ -233,7 +236,7 @@ def come_round(
 ) -> tuple[float, int, float]:
     """Look for a better pose with each angle that is at an end of its range at the other one; keep the best."""
     steps = 0
-    for number in range(m.s[MODEL.DOFS]):
+    for number in range(m.model[MODEL.DOFS]):
         if go_round(m, y, start, number):
             value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
             steps += more
@@ -273,7 +276,7 @@ def descend(
     m: Fit, start: Floats, y: Floats, value: float, damping: float, lightest: float
 ) -> tuple[float, int, float]:
     """From a pose whose cost and derivatives are known to the best nearby; fills y, and leaves marks where it ends."""
-    p, v, size = m.p, m.v, m.s[MODEL.DOFS]
+    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     step = at(v, p[STEP])
     before, bends, status = inf, damping == LIGHTEST, STUCK
     copy(size, start, y)

@@ -51,9 +51,9 @@ FIT_HEAD = 30
 class Fit(NamedTuple):
     """A fit: the mechanism with its room, and the integers, numbers and work of the fit."""
 
-    s: Ints
-    x: Floats
-    w: Floats
+    model: Ints
+    reals: Floats
+    data: Floats
     f: Floats
     p: Ints
     c: Floats

@@ -51,7 +51,7 @@ NEARLY_BACK = -0.99
 
 def sensors_turn(m: Fit) -> float:
     """Put the springs of the sensors on the links; what they cost."""
-    s, w, p, v, value = m.s, m.w, m.p, m.v, 0.0
+    model, data, p, v, value = m.model, m.data, m.p, m.v, 0.0
     for k in range(p[SENSORS]):
         weight, link = v[p[WEIGHTS] + p[MARKERS] + k], p[p[SENSOR_AT] + k]
         if not weight > 0.0:
@@ -61,7 +61,7 @@ def sensors_turn(m: Fit) -> float:
         value += 0.5 * weight * square
         if link < 0:
             continue
-        here = link_work(s, w, link)
+        here = link_work(model, data, link)
         i, load, turned = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH), at(v, p[TURNED] + 9 * link)
         x, y, z = times(weight * evenness(sqrt(square)), off)
         a, b, c = off
@@ -91,33 +91,35 @@ def turn_of(m: Fit, sensor: int) -> Vector:
     """The turn (rad, in ground) from the measured rotation of a sensor to the one that it has."""
     rows = at(m.c, MARKER_NUMBERS * m.p[MARKERS] + SENSOR_NUMBERS * sensor)
     wanted = at(m.v, m.p[MEASURED] + 3 * m.p[MARKERS] + 9 * sensor)
-    return turn_between(m.s, m.w, m.p[m.p[SENSOR_AT] + sensor], rows, wanted)
+    return turn_between(m.model, m.data, m.p[m.p[SENSOR_AT] + sensor], rows, wanted)
 
 
-def turn_between(s: Ints, w: Floats, link: int, rows: Floats, wanted: Floats) -> Vector:
+def turn_between(model: Ints, data: Floats, link: int, rows: Floats, wanted: Floats) -> Vector:
     """The turn (rad, in ground) that takes a wanted rotation to that of a frame of a link; both are given by rows."""
     twist, diagonal = ZERO, ZERO
     for k in range(3):
-        is_axis = direction(s, w, link, (rows[k], rows[3 + k], rows[6 + k]))
+        is_axis = direction(model, data, link, (rows[k], rows[3 + k], rows[6 + k]))
         axis = wanted[k], wanted[3 + k], wanted[6 + k]
         twist = plus(twist, cross(axis, is_axis))
         diagonal = plus(diagonal, elementwise(axis, is_axis))
     cosine, sine = 0.5 * (dot(diagonal, (1.0, 1.0, 1.0)) - 1.0), 0.5 * sqrt(dot(twist, twist))
     if cosine < NEARLY_BACK:
-        return turn_back(s, w, link, rows, wanted, twist, diagonal)
+        return turn_back(model, data, link, rows, wanted, twist, diagonal)
     if not sine > 1e-12:
         return times(0.5, twist)
     angle = acos(cosine) if cosine < 0.7 else sine_angle(sine)
     return times(0.5 * angle / sine, twist)
 
 
-def turn_back(s: Ints, w: Floats, link: int, rows: Floats, wanted: Floats, twist: Vector, diagonal: Vector) -> Vector:
+def turn_back(
+    model: Ints, data: Floats, link: int, rows: Floats, wanted: Floats, twist: Vector, diagonal: Vector
+) -> Vector:
     """The same for nearly half a turn: its even part is twice the axis times itself."""
     x, y, z = diagonal
     axis = 0 if x >= y and x >= z else (1 if y >= z else 2)
     row = ZERO
     for k in range(3):
-        is_axis = direction(s, w, link, (rows[k], rows[3 + k], rows[6 + k]))
+        is_axis = direction(model, data, link, (rows[k], rows[3 + k], rows[6 + k]))
         measured = wanted[k], wanted[3 + k], wanted[6 + k]
         row = along(along(row, component(is_axis, axis), measured), component(measured, axis), is_axis)
     cosine, sine = 0.5 * (x + y + z - 1.0), 0.5 * sqrt(dot(twist, twist))

@@ -25,7 +25,7 @@ SAME = 1e-9
 def move_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> None:
     """A pose in which no clamped coordinate is near an end of its range."""
     ranges = at(m.c, m.p[RANGES_AT])
-    for k in range(m.s[MODEL.DOFS]):
+    for k in range(m.model[MODEL.DOFS]):
         low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], from_pose[k]
         if low < high:
             inner = min(inwards, 0.5 * (high - low))
@@ -37,22 +37,22 @@ def turn_round(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: fl
 
     Subjects walk to and fro, and the way down from half a turn away may lead elsewhere.
     """
-    s, p, ranges = m.s, m.p, at(m.c, m.p[RANGES_AT])
+    model, p, ranges = m.model, m.p, at(m.c, m.p[RANGES_AT])
     move_inwards(m, from_pose, start, 2.0 * INWARDS)
     start[freedom] += angle
     is_inside = ranges[2 * freedom] <= start[freedom] <= ranges[2 * freedom + 1]
     if not (joint_to_ground(m, freedom) >= 0 and is_inside and p[p[RESOLVED_AT] + freedom] in (VARIABLE, AT_END)):
         return False
     look(m, from_pose)
-    down, turn = vector(m.x, GRAVITY_AT), vector(at(m.w, s[MODEL.WORK_COLUMN]), 6 * freedom)
+    down, turn = vector(m.reals, GRAVITY_AT), vector(at(m.data, model[MODEL.WORK_COLUMN]), 6 * freedom)
     return dot(turn, turn) > 0.0 and 2.0 * dot(turn, down) ** 2 >= dot(turn, turn) * dot(down, down)
 
 
 def joint_to_ground(m: Fit, freedom: int) -> int:
     """The link whose joint to ground has this degree of freedom, or -1 if it is of another joint."""
-    s, result = m.s, -1
-    for link in range(s[MODEL.LINKS]):
-        j = link_ints(s, link)
+    model, result = m.model, -1
+    for link in range(model[MODEL.LINKS]):
+        j = link_ints(model, link)
         if j[LINK.PARENT] < 0 and j[LINK.FIRST_DOF] <= freedom < j[LINK.END_DOF]:
             result = link
     return result
@@ -60,7 +60,7 @@ def joint_to_ground(m: Fit, freedom: int) -> int:
 
 def is_angle(m: Fit, freedom: int) -> bool:
     """Whether a degree of freedom turns anything in the pose that was looked at last, and may change."""
-    turn, mark = vector(at(m.w, m.s[MODEL.WORK_COLUMN]), 6 * freedom), m.p[m.p[RESOLVED_AT] + freedom]
+    turn, mark = vector(at(m.data, m.model[MODEL.WORK_COLUMN]), 6 * freedom), m.p[m.p[RESOLVED_AT] + freedom]
     return dot(turn, turn) > 0.0 and mark in (VARIABLE, AT_END)
 
 
@@ -80,7 +80,7 @@ def go_round(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     low, high = ranges[2 * freedom], ranges[2 * freedom + 1]
     if not is_at_end(m, y, freedom) or not (high - low > pi + SAME or joint_to_ground(m, freedom) >= 0):
         return False
-    copy(m.s[MODEL.DOFS], y, start)
+    copy(m.model[MODEL.DOFS], y, start)
     start[freedom] = min(high, low + 2.0 * pi) if y[freedom] <= low + SAME else max(low, high - 2.0 * pi)
     look(m, y)
     return is_angle(m, freedom)
@@ -95,9 +95,9 @@ def turn_over(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     link, others = joint_to_ground(m, freedom), 0
     if link < 0 or not is_at_end(m, y, freedom):
         return False
-    copy(m.s[MODEL.DOFS], y, start)
+    copy(m.model[MODEL.DOFS], y, start)
     look(m, y)
-    j, ranges = link_ints(m.s, link), at(m.c, m.p[RANGES_AT])
+    j, ranges = link_ints(m.model, link), at(m.c, m.p[RANGES_AT])
     for k in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
         if k != freedom and is_angle(m, k):
             others += 1
@@ -110,7 +110,7 @@ def turn_over(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
 def leave_ends(m: Fit, y: Floats, start: Floats) -> bool:
     """A pose in which what is at an end of its range is not; false if there is nothing."""
     ranges, result = at(m.c, m.p[RANGES_AT]), False
-    for k in range(m.s[MODEL.DOFS]):
+    for k in range(m.model[MODEL.DOFS]):
         low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], y[k]
         if m.p[m.p[RESOLVED_AT] + k] == AT_END and low < high:
             inwards = min(INWARDS, 0.5 * (high - low))
@@ -120,7 +120,7 @@ def leave_ends(m: Fit, y: Floats, start: Floats) -> bool:
 
 def unwind(m: Fit, y: Floats, first: Floats, start: Floats, value: float) -> bool:
     """A pose without the whole turns that the way from the first one has led to, if it costs no more."""
-    size, ranges, trial, result = m.s[MODEL.DOFS], at(m.c, m.p[RANGES_AT]), at(m.v, m.p[TRIAL]), False
+    size, ranges, trial, result = m.model[MODEL.DOFS], at(m.c, m.p[RANGES_AT]), at(m.v, m.p[TRIAL]), False
     copy(size, y, start)
     for k in range(size):
         turns = floor((y[k] - first[k]) / (2.0 * pi) + 0.5)

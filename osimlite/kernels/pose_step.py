@@ -37,7 +37,7 @@ SOFTEST = 0.01
 def list_free(m: Fit) -> int:
     """List the coordinates that are free, and at no end of their ranges; returns their count."""
     p, count = m.p, 0
-    for k in range(m.s[MODEL.DOFS]):
+    for k in range(m.model[MODEL.DOFS]):
         if p[p[RESOLVED_AT] + k] == VARIABLE:
             p[p[FREE_AT] + count] = k
             count += 1
@@ -46,7 +46,7 @@ def list_free(m: Fit) -> int:
 
 def equations_for(m: Fit, free: int, has_step: int) -> tuple[Floats, Floats, Floats]:
     """The equations for the free coordinates, what they are to give after steps of others, and room behind."""
-    p, v, size = m.p, m.v, m.s[MODEL.DOFS]
+    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     count, rows, errors, step = equations_of(m), at(v, p[ROWS]), at(v, p[ERRORS]), at(v, p[STEP])
     factor = at(v, p[ROOM] + 2 * size)
     right = at(factor, count * size + count * count + 3 * count + 1)
@@ -65,7 +65,7 @@ def find_ends(m: Fit, y: Floats) -> None:
     """Which coordinates stay at ends of their ranges: those that are there, and are pulled outwards."""
     p, v = m.p, m.v
     ranges, slope = at(m.c, p[RANGES_AT]), at(v, p[SLOPE])
-    for k in range(m.s[MODEL.DOFS]):
+    for k in range(m.model[MODEL.DOFS]):
         if p[p[RESOLVED_AT] + k] == VARIABLE or p[p[RESOLVED_AT] + k] == AT_END:
             low, high = ranges[2 * k], ranges[2 * k + 1]
             out = (y[k] <= low and slope[k] > 0.0) or (y[k] >= high and slope[k] < 0.0) or low == high
@@ -75,14 +75,14 @@ def find_ends(m: Fit, y: Floats) -> None:
 def free_ends(m: Fit) -> None:
     """No coordinate stays at an end of its range any more."""
     p = m.p
-    for k in range(m.s[MODEL.DOFS]):
+    for k in range(m.model[MODEL.DOFS]):
         if p[p[RESOLVED_AT] + k] == AT_END:
             p[p[RESOLVED_AT] + k] = VARIABLE
 
 
 def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
     """The step of all coordinates to where the quadratic model is least, in their ranges; false if it is no bowl."""
-    p, v, size = m.p, m.v, m.s[MODEL.DOFS]
+    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     step, ranges = at(v, p[STEP]), at(m.c, p[RANGES_AT])
     for k in range(size):
         step[k] = 0.0
@@ -107,7 +107,7 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
 
 def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) -> int:
     """The step of the free coordinates, after those of others; its place in the work, or -1 if the model is no bowl."""
-    p, v, size = m.p, m.v, m.s[MODEL.DOFS]
+    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     stiffness, bend, slope, step = at(v, p[STIFFNESS]), at(v, p[BEND]), at(v, p[SLOPE]), at(v, p[STEP])
     count = equations_of(m)
     place = p[ROOM] + 2 * size + (count * size + count * count + 3 * count + 1) + 2 * count
@@ -136,7 +136,7 @@ def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) 
 
 def solve_along(m: Fit, free: int, place: int, smallest: float) -> int:
     """The same where equations bind the coordinates: along the directions that they leave free."""
-    v, size, count = m.v, m.s[MODEL.DOFS], equations_of(m)
+    v, size, count = m.v, m.model[MODEL.DOFS], equations_of(m)
     solution, matrix = at(v, place), at(v, place + size)
     across = at(matrix, size * size)
     directions = at(across, size)

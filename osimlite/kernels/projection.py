@@ -26,13 +26,13 @@ ITERATIONS = 20
 """Newton's steps of a projection."""
 
 
-def project(s: Ints, x: Floats, w: Floats, y: Floats, off: Floats, has_errors: int) -> int:
+def project(model: Ints, reals: Floats, data: Floats, y: Floats, off: Floats, has_errors: int) -> int:
     """Move a state to where the constraints hold, if it is near; else it stays.
 
     Args:
-        s: the mechanism.
-        x: its numbers.
-        w: what the constraints may be off, and may be off at most in y, are in SCRATCH.
+        model: the mechanism.
+        reals: its numbers.
+        data: what the constraints may be off, and may be off at most in y, are in SCRATCH.
         y: the state.
         off: how far off each entry of it may be; of that, what lies across the constraints is taken away.
         has_errors: 0 if that is not known.
@@ -40,55 +40,59 @@ def project(s: Ints, x: Floats, w: Floats, y: Floats, off: Floats, has_errors: i
     Returns:
         OK if they hold then.
     """
-    size, h = s[MODEL.DOFS], at(s, s[MODEL.CONSTRAINED])
-    tolerance, limit = w[WORK.SCRATCH], w[WORK.SCRATCH + 1]
-    trial = at(w, h[CONSTRAINED.WORK_TRIAL])
+    size, h = model[MODEL.DOFS], at(model, model[MODEL.CONSTRAINED])
+    tolerance, limit = data[WORK.SCRATCH], data[WORK.SCRATCH + 1]
+    trial = at(data, h[CONSTRAINED.WORK_TRIAL])
     for k in range(2 * size):
         trial[k] = y[k]
-    status = bound(s, x, w, trial)
+    status = bound(model, reals, data, trial)
     if status == OUTCOME.OK:
-        status = project_values(s, x, w, trial, off, has_errors, tolerance, limit)
+        status = project_values(model, reals, data, trial, off, has_errors, tolerance, limit)
     if status == OUTCOME.OK:
-        status = project_speeds(s, w, trial, at(off, size), has_errors, tolerance, limit)
+        status = project_speeds(model, data, trial, at(off, size), has_errors, tolerance, limit)
     if status == OUTCOME.OK:
         for k in range(2 * size):
             y[k] = trial[k]
     return status
 
 
-def bound(s: Ints, x: Floats, w: Floats, y: Floats) -> int:
+def bound(model: Ints, reals: Floats, data: Floats, y: Floats) -> int:
     """All equations at a state."""
-    f = at(w, s[s[MODEL.CONSTRAINED] + CONSTRAINED.WORK_TRIAL] + 2 * s[MODEL.DOFS])
-    status = call(s[MODEL.LAWS], s, x, w, y, f, STAGE.VELOCITY)
+    f = at(data, model[model[MODEL.CONSTRAINED] + CONSTRAINED.WORK_TRIAL] + 2 * model[MODEL.DOFS])
+    status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.VELOCITY)
     if status == OUTCOME.OK:
-        bind(s, x, w, y, f)
+        bind(model, reals, data, y, f)
     return status
 
 
 def project_values(
-    s: Ints, x: Floats, w: Floats, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float
+    model: Ints, reals: Floats, data: Floats, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float
 ) -> int:
     """Change the values of a state whose equations are known, and the errors with them; the equations follow."""
-    size, h = s[MODEL.DOFS], at(s, s[MODEL.CONSTRAINED])
-    count, kept, factor = h[CONSTRAINED.POSITIONS], at(w, h[CONSTRAINED.WORK_KEPT]), at(w, h[CONSTRAINED.WORK_FACTOR])
-    errors = at(w, h[CONSTRAINED.WORK_SYSTEM])
-    room, step, following = at(errors, count), at(errors, 2 * count), at(w, h[CONSTRAINED.WORK_TRIAL] + 4 * size)
-    norm = position_errors(s, w, errors)
+    size, h = model[MODEL.DOFS], at(model, model[MODEL.CONSTRAINED])
+    count, kept, factor = (
+        h[CONSTRAINED.POSITIONS],
+        at(data, h[CONSTRAINED.WORK_KEPT]),
+        at(data, h[CONSTRAINED.WORK_FACTOR]),
+    )
+    errors = at(data, h[CONSTRAINED.WORK_SYSTEM])
+    room, step, following = at(errors, count), at(errors, 2 * count), at(data, h[CONSTRAINED.WORK_TRIAL] + 4 * size)
+    norm = position_errors(model, data, errors)
     if norm <= tolerance:
         return OUTCOME.OK
     if not norm <= limit:
         return OUTCOME.FAR
     for iteration in range(ITERATIONS):
-        rows_by_values(s, w, y, kept)
+        rows_by_values(model, data, y, kept)
         for k in range(count * size):
             factor[k] = kept[k]
-        factored(s, w, count, factor, REDUNDANT * count)
-        solved(s, count, factor, errors, room, step)
+        factored(model, data, count, factor, REDUNDANT * count)
+        solved(model, count, factor, errors, room, step)
         for k in range(size):
             following[k], following[size + k] = y[k] - step[k], y[size + k]
         before, norm = norm, inf
-        if bound(s, x, w, following) == OUTCOME.OK:
-            norm = position_errors(s, w, errors)
+        if bound(model, reals, data, following) == OUTCOME.OK:
+            norm = position_errors(model, data, errors)
         if iteration > 0 and not norm <= before:
             norm = before
             break
@@ -99,19 +103,29 @@ def project_values(
     if not norm <= tolerance:
         return OUTCOME.FAR
     if has_errors > 0:
-        across(s, count, kept, factor, off, errors, room, step)
+        across(model, count, kept, factor, off, errors, room, step)
         for k in range(size):
             off[k] -= step[k]
-    return bound(s, x, w, y)
+    return bound(model, reals, data, y)
 
 
-def project_speeds(s: Ints, w: Floats, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float) -> int:
+def project_speeds(
+    model: Ints, data: Floats, y: Floats, off: Floats, has_errors: int, tolerance: float, limit: float
+) -> int:
     """Change the speeds of a state whose equations are known, and their errors with them."""
-    size, h = s[MODEL.DOFS], at(s, s[MODEL.CONSTRAINED])
-    count, rows, factor = h[CONSTRAINED.EQUATIONS], at(w, h[CONSTRAINED.WORK_ROWS]), at(w, h[CONSTRAINED.WORK_FACTOR])
-    errors, scales, u = at(w, h[CONSTRAINED.WORK_SYSTEM]), at(w, h[CONSTRAINED.WORK_TRIAL] + 4 * size), at(y, size)
+    size, h = model[MODEL.DOFS], at(model, model[MODEL.CONSTRAINED])
+    count, rows, factor = (
+        h[CONSTRAINED.EQUATIONS],
+        at(data, h[CONSTRAINED.WORK_ROWS]),
+        at(data, h[CONSTRAINED.WORK_FACTOR]),
+    )
+    errors, scales, u = (
+        at(data, h[CONSTRAINED.WORK_SYSTEM]),
+        at(data, h[CONSTRAINED.WORK_TRIAL] + 4 * size),
+        at(y, size),
+    )
     room, step = at(errors, count), at(errors, 2 * count)
-    norm = speed_errors(s, w, u, errors)
+    norm = speed_errors(model, data, u, errors)
     if norm <= tolerance:
         return OUTCOME.OK
     if not norm <= limit:
@@ -121,26 +135,26 @@ def project_speeds(s: Ints, w: Floats, y: Floats, off: Floats, has_errors: int, 
     for i in range(count):
         for k in range(size):
             factor[size * i + k] = scales[k] * rows[size * i + k]
-    factored(s, w, count, factor, REDUNDANT * count)
+    factored(model, data, count, factor, REDUNDANT * count)
     # The rows do not depend on the speeds: one step does, a second one mends its rounding.
     for _ in range(2):
-        solved(s, count, factor, errors, room, step)
+        solved(model, count, factor, errors, room, step)
         for k in range(size):
             u[k] -= scales[k] * step[k]
-        norm = speed_errors(s, w, u, errors)
+        norm = speed_errors(model, data, u, errors)
         if norm <= max(OVERSHOOT * tolerance, FINEST):
             break
     if not norm <= tolerance:
         return OUTCOME.FAR
     if has_errors > 0:
-        across(s, count, rows, factor, off, errors, room, step)
+        across(model, count, rows, factor, off, errors, room, step)
         for k in range(size):
             off[k] -= scales[k] * step[k]
     return OUTCOME.OK
 
 
 def across(
-    s: Ints,
+    model: Ints,
     count: int,
     rows: Floats,
     factor: Floats,
@@ -150,30 +164,30 @@ def across(
     found: Floats,
 ) -> None:
     """What of some errors lies across equations, of which the factor is known."""
-    size = s[MODEL.DOFS]
+    size = model[MODEL.DOFS]
     for i in range(count):
         values[i] = 0.0
         for k in range(size):
             values[i] += rows[size * i + k] * off[k]
-    solved(s, count, factor, values, room, found)
+    solved(model, count, factor, values, room, found)
 
 
-def position_errors(s: Ints, w: Floats, errors: Floats) -> float:
+def position_errors(model: Ints, data: Floats, errors: Floats) -> float:
     """The errors of the positions one after the other, and their root mean square."""
-    h, count, total = at(s, s[MODEL.CONSTRAINED]), 0, 0.0
+    h, count, total = at(model, model[MODEL.CONSTRAINED]), 0, 0.0
     for number in range(h[CONSTRAINED.CONSTRAINTS]):
-        constraint = at(s, s[h[CONSTRAINED.CONSTRAINT_AT] + number])
+        constraint = at(model, model[h[CONSTRAINED.CONSTRAINT_AT] + number])
         for row in range(constraint[CONSTRAINT.FIRST_EQUATION], constraint[CONSTRAINT.END_POSITION]):
-            errors[count] = w[h[CONSTRAINED.WORK_ERRORS] + row]
+            errors[count] = data[h[CONSTRAINED.WORK_ERRORS] + row]
             total += errors[count] * errors[count]
             count += 1
     return sqrt(total / max(count + h[CONSTRAINED.LOCKS], 1))
 
 
-def speed_errors(s: Ints, w: Floats, u: Floats, errors: Floats) -> float:
+def speed_errors(model: Ints, data: Floats, u: Floats, errors: Floats) -> float:
     """The errors of the speeds, and their root mean square."""
-    h, size, total = at(s, s[MODEL.CONSTRAINED]), s[MODEL.DOFS], 0.0
-    rows, rates = at(w, h[CONSTRAINED.WORK_ROWS]), at(w, h[CONSTRAINED.WORK_RATES])
+    h, size, total = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS], 0.0
+    rows, rates = at(data, h[CONSTRAINED.WORK_ROWS]), at(data, h[CONSTRAINED.WORK_RATES])
     for i in range(h[CONSTRAINED.EQUATIONS]):
         error = -rates[i]
         for k in range(size):
@@ -183,18 +197,18 @@ def speed_errors(s: Ints, w: Floats, u: Floats, errors: Floats) -> float:
     return sqrt(total / max(h[CONSTRAINED.EQUATIONS] + h[CONSTRAINED.LOCKS], 1))
 
 
-def rows_by_values(s: Ints, w: Floats, y: Floats, rows: Floats) -> None:
+def rows_by_values(model: Ints, data: Floats, y: Floats, rows: Floats) -> None:
     """Derivatives of the errors of the positions by the coordinates."""
-    h, size, count = at(s, s[MODEL.CONSTRAINED]), s[MODEL.DOFS], 0
+    h, size, count = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS], 0
     for number in range(h[CONSTRAINED.CONSTRAINTS]):
-        constraint = at(s, s[h[CONSTRAINED.CONSTRAINT_AT] + number])
+        constraint = at(model, model[h[CONSTRAINED.CONSTRAINT_AT] + number])
         for i in range(constraint[CONSTRAINT.FIRST_EQUATION], constraint[CONSTRAINT.END_POSITION]):
-            row, given = at(rows, size * count), at(w, h[CONSTRAINED.WORK_ROWS] + size * i)
+            row, given = at(rows, size * count), at(data, h[CONSTRAINED.WORK_ROWS] + size * i)
             for k in range(size):
                 row[k] = given[k]
             count += 1
     for number in range(h[CONSTRAINED.BALLS]):
-        a = at(s, s[h[CONSTRAINED.BALL_AT] + number])
+        a = at(model, model[h[CONSTRAINED.BALL_AT] + number])
         s1, c1 = sine_cosine(y[a[0]])
         s2, c2 = sine_cosine(y[a[1]])
         for i in range(count):

@@ -13,57 +13,57 @@ from osimlite.kernels.pointers import Floats, Ints, at, call
 from osimlite.kernels.points import direction, station
 
 
-def touch_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def touch_ellipsoid(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """An ellipsoid on a half space; after the numbers of a pair stand the directions of its axes and half axes."""
-    i = at(s, item)
-    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(x, i[ITEM.NUMBERS])
-    o, n = station(s, w, one, vector(p, 0)), direction(s, w, one, vector(p, 3))
-    center = station(s, w, two, vector(p, 7))
-    d, radius, point = half_space_ellipsoid(o, n, center, axes(s, w, two, at(p, 18)), vector(p, 27), p[12])
+    i = at(model, item)
+    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
+    o, n = station(model, data, one, vector(p, 0)), direction(model, data, one, vector(p, 3))
+    center = station(model, data, two, vector(p, 7))
+    d, radius, point = half_space_ellipsoid(o, n, center, axes(model, data, two, at(p, 18)), vector(p, 27), p[12])
     if d > 0.0:
-        press(s, x, w, item, d, radius, n, point)
+        press(model, reals, data, item, d, radius, n, point)
     return OUTCOME.OK
 
 
-def touch_ellipsoids(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def touch_ellipsoids(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Two ellipsoids, of which one may be a sphere; axes and half axes of both stand after the numbers of a pair."""
-    i = at(s, item)
-    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(x, i[ITEM.NUMBERS])
-    a, b = station(s, w, one, vector(p, 0)), station(s, w, two, vector(p, 7))
+    i = at(model, item)
+    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
+    a, b = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 7))
     way = minus(b, a)
     if dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
         return OUTCOME.OK
-    axes1, axes2 = axes(s, w, one, at(p, 18)), axes(s, w, two, at(p, 30))
+    axes1, axes2 = axes(model, data, one, at(p, 18)), axes(model, data, two, at(p, 30))
     d, radius, n, point = ellipsoid_ellipsoid(a, axes1, vector(p, 27), b, axes2, vector(p, 39), p[12])
     if d > 0.0:
-        press(s, x, w, item, d, radius, n, point)
+        press(model, reals, data, item, d, radius, n, point)
     return OUTCOME.OK
 
 
-def axes(s: Ints, w: Floats, link: int, p: Floats) -> Axes:
+def axes(model: Ints, data: Floats, link: int, p: Floats) -> Axes:
     """The axes of an ellipsoid in ground."""
-    one, two = direction(s, w, link, vector(p, 0)), direction(s, w, link, vector(p, 3))
-    return one, two, direction(s, w, link, vector(p, 6))
+    one, two = direction(model, data, link, vector(p, 0)), direction(model, data, link, vector(p, 3))
+    return one, two, direction(model, data, link, vector(p, 6))
 
 
-def early_return(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """All pairs of one force in Simbody's order, until one separates too fast to push.
 
     The integers are the numbers of surfaces and pairs, the link of each surface, and the surfaces of each pair; the
     numbers the centre and radius of each surface. Simbody sweeps along the axis of ground on which the centres lie
     farthest apart (largest sum of distances from their mean), from the surface that begins first.
     """
-    i = at(s, item)
+    i = at(model, item)
     count, pairs, links, p, room = (
         i[ITEM.OWN],
         i[ITEM.OWN + 1],
         at(i, ITEM.OWN + 2),
-        at(x, i[ITEM.NUMBERS]),
-        at(w, i[ITEM.RECORD]),
+        at(reals, i[ITEM.NUMBERS]),
+        at(data, i[ITEM.RECORD]),
     )
     centers, start, order = room, at(room, 3 * count), at(room, 4 * count)
     for k in range(count):
-        put(centers, 3 * k, station(s, w, links[k], vector(p, 4 * k)))
+        put(centers, 3 * k, station(model, data, links[k], vector(p, 4 * k)))
     axis = 0
     widest = -1.0
     for side in range(3):
@@ -91,7 +91,9 @@ def early_return(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int)
                 break
             if near(at(centers, 3 * one), at(centers, 3 * two), p[4 * one + 3], p[4 * two + 3]):
                 pair = pair_of(at(links, count), pairs, one, two)
-                if pair >= 0 and separates(s, x, w, y, f, s[s[MODEL.CONTACT_AT] + i[ITEM.FIRST_CONTACT] + pair]):
+                if pair >= 0 and separates(
+                    model, reals, data, y, f, model[model[MODEL.CONTACT_AT] + i[ITEM.FIRST_CONTACT] + pair]
+                ):
                     return OUTCOME.OK
     return OUTCOME.OK
 
@@ -113,8 +115,8 @@ def pair_of(surfaces: Ints, pairs: int, one: int, two: int) -> int:
     return -1
 
 
-def separates(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, part: int) -> bool:
+def separates(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, part: int) -> bool:
     """Compute one contact; whether it touches and does not push."""
-    call(s[part + ITEM.LAW], s, x, w, y, f, part)
-    result = at(w, s[part + ITEM.RECORD])
+    call(model[part + ITEM.LAW], model, reals, data, y, f, part)
+    result = at(data, model[part + ITEM.RECORD])
     return bool(result[CONTACT_WORK.DEPTH] > 0.0 and result[0] == 0.0 and result[1] == 0.0 and result[2] == 0.0)

@@ -32,7 +32,7 @@ STATES = 6
 MOST_TRIES, TIMES, MOST_EVENTS, EVENT, WATCHES, MOST_LOGGED = 0, 1, 2, 3, 4, 5
 """Places of the sizes: steps that may be tried, how many rows there are and how long the row of an event is."""
 START_HOLDS, METHOD, METHOD_AT = 6, 7, 8
-"""Places of whether the constraints hold at the start, of the address of the method and of its place in `w`."""
+"""Places of whether the constraints hold at the start, of the address of the method and of its place in `data`."""
 
 
 class Motion(NamedTuple):
@@ -41,9 +41,9 @@ class Motion(NamedTuple):
     A state has y numbers, see STATE_SIZE.
     """
 
-    s: Ints  # the mechanism
-    x: Floats  # its numbers
-    w: Floats  # room; at METHOD_AT the method's
+    model: Ints  # the mechanism
+    reals: Floats  # its numbers
+    data: Floats  # room; at METHOD_AT the method's
     sizes: Ints  # see MOST_TRIES
     clock: Floats  # time and next step to try, s; changed
     # steps taken, tried, evaluations, reports made, steps logged, events; changed. Events beyond the room for them
@@ -65,23 +65,23 @@ class Motion(NamedTuple):
 
 def evaluated(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int:
     """Evaluate at a time."""
-    m.w[WORK.TIME] = t
-    return call(m.s[MODEL.LAWS], m.s, m.x, m.w, y, f, stage)
+    m.data[WORK.TIME] = t
+    return call(m.model[MODEL.LAWS], m.model, m.reals, m.data, y, f, stage)
 
 
 def inside(
     m: Motion, t0: float, y0: Floats, f0: Floats, t1: float, y1: Floats, f1: Floats, t: float, y: Floats
 ) -> None:
     """State y at a time within a step, where the constraints hold if it can be moved there."""
-    cubic(m.s[MODEL.STATE_SIZE], t0, y0, f0, t1, y1, f1, t, y)
-    if m.s[MODEL.CONSTRAINED] > 0:
-        projected(m.s, m.x, m.w, t, y, y, 0, m.w[m.sizes[METHOD_AT] + ACCEPTED] / 10.0, inf)
+    cubic(m.model[MODEL.STATE_SIZE], t0, y0, f0, t1, y1, f1, t, y)
+    if m.model[MODEL.CONSTRAINED] > 0:
+        projected(m.model, m.reals, m.data, t, y, y, 0, m.data[m.sizes[METHOD_AT] + ACCEPTED] / 10.0, inf)
 
 
 def note_peaks(m: Motion, t: float) -> None:
     """Keep the largest forces."""
-    for pair in range(m.s[MODEL.CONTACTS]):
-        c, peak = at(m.w, m.s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair), at(m.peaks, 2 * pair)
+    for pair in range(m.model[MODEL.CONTACTS]):
+        c, peak = at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair), at(m.peaks, 2 * pair)
         size = sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
         if size > peak[0]:
             peak[0], peak[1] = size, t
@@ -89,25 +89,25 @@ def note_peaks(m: Motion, t: float) -> None:
 
 def note_step(m: Motion, t: float, y: Floats, f: Floats) -> None:
     """Write a step into the log."""
-    size, row = m.s[MODEL.STATE_SIZE], m.counts[LOGGED]
+    size, row = m.model[MODEL.STATE_SIZE], m.counts[LOGGED]
     log = at(m.log, (1 + 2 * size) * row)
     log[0] = t
     copy(size, y, at(log, 1))
     copy(size, f, at(log, 1 + size))
-    for pair in range(m.s[MODEL.CONTACTS]):
+    for pair in range(m.model[MODEL.CONTACTS]):
         copy(
             3,
-            at(m.w, m.s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair),
-            at(m.forces, 3 * (m.s[MODEL.CONTACTS] * row + pair)),
+            at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair),
+            at(m.forces, 3 * (m.model[MODEL.CONTACTS] * row + pair)),
         )
     m.counts[LOGGED] += 1
 
 
 def levels_at(m: Motion, y: Floats, levels: Floats) -> None:
     """Fill levels: of each contact 1 if it pushes, else -1; of each watch how far it is above its level."""
-    pairs = m.s[MODEL.CONTACTS]
+    pairs = m.model[MODEL.CONTACTS]
     for pair in range(pairs):
-        c = at(m.w, m.s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
+        c = at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
         levels[pair] = 1.0 if c[0] != 0.0 or c[1] != 0.0 or c[2] != 0.0 else -1.0
     for number in range(m.sizes[WATCHES]):
         watch, a = at(m.watches, 3 * number), at(m.levels, 7 * number)
@@ -116,7 +116,7 @@ def levels_at(m: Motion, y: Floats, levels: Floats) -> None:
         elif watch[0] == TOUCH:
             levels[pairs + number] = levels[watch[1]]
         else:
-            levels[pairs + number] = dot(station(m.s, m.w, watch[1], vector(a, 0)), vector(a, 3)) - a[6]
+            levels[pairs + number] = dot(station(m.model, m.data, watch[1], vector(a, 0)), vector(a, 3)) - a[6]
 
 
 def note_events(
@@ -132,9 +132,9 @@ def note_events(
 ) -> float:
     """Write down what began and ended within a step; returns the time at which the run is to stop, or infinity."""
     counts, events = m.counts, m.events
-    size, pairs = m.s[MODEL.STATE_SIZE], m.s[MODEL.CONTACTS]
+    size, pairs = m.model[MODEL.STATE_SIZE], m.model[MODEL.CONTACTS]
     stop, first, total, event = inf, counts[EVENTS], pairs + m.sizes[WATCHES], m.sizes[EVENT]
-    ya = at(m.w, m.s[MODEL.WORK_STATE] + 4 * size)
+    ya = at(m.data, m.model[MODEL.WORK_STATE] + 4 * size)
     fa, result = at(ya, size), at(after, total)
     for number in range(total):
         rises = after[number] > 0.0

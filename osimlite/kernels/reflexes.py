@@ -59,13 +59,13 @@ class LIMITS(metaclass=Record):
     CONTROL_NOISE, CONTROL_PART, SENSOR_NOISE, SENSOR_PART, HEAD = range(SEED + 1, SEED + 6)
 
 
-def note_senses(s: Ints, w: Floats, i: Ints, p: Floats, frames: int, row: Floats, history: Floats) -> None:
+def note_senses(model: Ints, data: Floats, i: Ints, p: Floats, frames: int, row: Floats, history: Floats) -> None:
     """Remember what is felt after so many rows."""
     sensors = i[REFLEXES.SENSORS]
     kept = at(history, sensors * (frames % i[REFLEXES.KEPT]))
     sources = at(i, REFLEXES.HEAD + TERM.SIZE * i[REFLEXES.TERMS] + OF_GATE * i[REFLEXES.GATES])
     for k in range(sensors):
-        kept[k] = felt(s, w, at(sources, SOURCE.SIZE * k), p, row)
+        kept[k] = felt(model, data, at(sources, SOURCE.SIZE * k), p, row)
     if i[REFLEXES.IS_NOISY] > 0:
         for k in range(sensors):
             width = p[LIMITS.SENSOR_NOISE] + p[LIMITS.SENSOR_PART] * abs(kept[k])

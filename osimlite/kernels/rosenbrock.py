@@ -72,12 +72,12 @@ SAFETY, SHRINK, GROW, WORTH = 0.9, 0.2, 5.0, 1.1
 """Of the step that should just do, which is taken; how much a step changes at most, and at least to be made longer."""
 
 
-def rosenbrock(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int) -> int:
+def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
     """Try one step from y0, behind which its derivative stands, to y1."""
-    size = s[MODEL.STATE_SIZE]
-    h = at(w, place)
+    size = model[MODEL.STATE_SIZE]
+    h = at(data, place)
     stages, room = at(h, HEAD), at(h, HEAD + STATES * size)
-    errors, f1 = at(w, s[MODEL.WORK_STATE] + ERRORS * size), at(y1, size)
+    errors, f1 = at(data, model[MODEL.WORK_STATE] + ERRORS * size), at(y1, size)
     t0, accuracy, step = h[REACHED], h[ACCEPTED], h[NEXT_STEP]
     h[EVALUATED], h[HAS_DERIVATIVE] = 2.0, 0.0
     t1 = h[LAST_TIME] if h[LAST_TIME] <= t0 + 1.001 * step else t0 + step
@@ -85,17 +85,17 @@ def rosenbrock(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int
     step = t1 - t0
     c, error = DIAGONAL * step, inf
     if h[IS_NEW] == 0.0:
-        w[WORK.TIME] = t0
+        data[WORK.TIME] = t0
         copy(size, y0, y1)
-        h[IS_NEW] = 1.0 if linearise(s, x, w, y1, f1, room, h[IS_EVALUATED]) == OUTCOME.OK else 0.0
+        h[IS_NEW] = 1.0 if linearise(model, reals, data, y1, f1, room, h[IS_EVALUATED]) == OUTCOME.OK else 0.0
     h[IS_EVALUATED] = 0.0
-    if h[IS_NEW] > 0.0 and condense(s, c, room) and staged(s, x, w, t0, step, c, y0, y1, stages, room):
+    if h[IS_NEW] > 0.0 and condense(model, c, room) and staged(model, reals, data, t0, step, c, y0, y1, stages, room):
         for k in range(size):
             y1[k], errors[k] = y0[k], 0.0
             for i in range(STAGES):
                 y1[k] += ENDS[i] * stages[size * i + k]
                 errors[k] += MISSES[i] * stages[size * i + k]
-        error = step_error(s, x, w, t1, y0, y1, errors, h, 1)
+        error = step_error(model, reals, data, t1, y0, y1, errors, h, 1)
     factor = SAFETY * (accuracy / max(error, 1e-9 * accuracy)) ** (1.0 / 3.0)
     if not error <= accuracy:
         # Near the resolution of the time, the step was longer than it was to be.
@@ -108,10 +108,19 @@ def rosenbrock(s: Ints, x: Floats, w: Floats, y0: Floats, y1: Floats, place: int
 
 
 def staged(
-    s: Ints, x: Floats, w: Floats, t0: float, step: float, c: float, y0: Floats, y: Floats, stages: Floats, room: Floats
+    model: Ints,
+    reals: Floats,
+    data: Floats,
+    t0: float,
+    step: float,
+    c: float,
+    y0: Floats,
+    y: Floats,
+    stages: Floats,
+    room: Floats,
 ) -> bool:
     """Compute the stages; y has room for a state and its derivative."""
-    size, f = s[MODEL.STATE_SIZE], at(y, s[MODEL.STATE_SIZE])
+    size, f = model[MODEL.STATE_SIZE], at(y, model[MODEL.STATE_SIZE])
     for i in range(STAGES):
         stage, rates = at(stages, size * i), f if TIMES[i] > 0.0 else at(y0, size)
         if TIMES[i] > 0.0:
@@ -119,12 +128,14 @@ def staged(
                 y[k] = y0[k]
                 for j in range(i):
                     y[k] += PLACES[STAGES * i + j] * stages[size * j + k]
-            w[WORK.TIME] = t0 + TIMES[i] * step
-            if call(s[MODEL.LAWS], s, x, w, y, f, STAGE.ACCELERATION) != OUTCOME.OK or not is_finite(size, f):
+            data[WORK.TIME] = t0 + TIMES[i] * step
+            if call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.ACCELERATION) != OUTCOME.OK or not is_finite(
+                size, f
+            ):
                 return False
         for k in range(size):
             stage[k] = c * rates[k]
             for j in range(i):
                 stage[k] += CARRIED[STAGES * i + j] * stages[size * j + k]
-        correct(s, c, room, stage)
+        correct(model, c, room, stage)
     return True

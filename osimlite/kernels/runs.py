@@ -56,9 +56,9 @@ from osimlite.kernels.step_sizes import shortest_step
 
 
 def run_several(
-    s: Ints,
-    x: Floats,
-    w: Floats,
+    model: Ints,
+    reals: Floats,
+    data: Floats,
     each: int,
     sizes: Ints,
     clocks: Floats,
@@ -78,20 +78,20 @@ def run_several(
 ) -> int:
     """The runs `first` to `last` - 1, each on its own rows.
 
-    Args: as of `Motion`, one row for each run; a log, `w` and what tells how to run serve them all. `each` is the
+    Args: as of `Motion`, one row for each run; a log, `data` and what tells how to run serve them all. `each` is the
     length of a row of numbers, 0 if one serves them all.
     """
     for k in range(first, last):
-        m = run_of(s, x, w, each, sizes, clocks, counts, states, times, reports, log, forces, events, peaks, watches,
-                   levels, k)  # fmt: skip
-        endings[k] = run(m, at(states, k * s[MODEL.STATE_SIZE]), False)
+        m = run_of(model, reals, data, each, sizes, clocks, counts, states, times, reports, log, forces, events, peaks,
+                   watches, levels, k)  # fmt: skip
+        endings[k] = run(m, at(states, k * model[MODEL.STATE_SIZE]), False)
     return OUTCOME.OK
 
 
 def run_of(
-    s: Ints,
-    x: Floats,
-    w: Floats,
+    model: Ints,
+    reals: Floats,
+    data: Floats,
     each: int,
     sizes: Ints,
     clocks: Floats,
@@ -108,11 +108,11 @@ def run_of(
     k: int,
 ) -> Motion:
     """One of several runs."""
-    size, pairs = s[MODEL.STATE_SIZE], s[MODEL.CONTACTS]
+    size, pairs = model[MODEL.STATE_SIZE], model[MODEL.CONTACTS]
     return Motion(
-        s,
-        at(x, each * k),
-        w,
+        model,
+        at(reals, each * k),
+        data,
         sizes,
         at(clocks, 2 * k),
         at(counts, COUNTED * k),
@@ -132,14 +132,14 @@ def run(m: Motion, y: Floats, is_going: bool) -> int:
 
     Its derivative is that at the end of the run before if that goes on.
     """
-    s, counts, clock, sizes = m.s, m.counts, m.clock, m.sizes
-    size = s[MODEL.STATE_SIZE]
-    room, h = at(m.w, s[MODEL.WORK_STATE]), at(m.w, sizes[METHOD_AT])
+    model, counts, clock, sizes = m.model, m.counts, m.clock, m.sizes
+    size = model[MODEL.STATE_SIZE]
+    room, h = at(m.data, model[MODEL.WORK_STATE]), at(m.data, sizes[METHOD_AT])
     y0, f0, y1, f1 = room, at(room, size), at(room, 2 * size), at(room, 3 * size)
     before = at(room, STATES * size)
-    after = at(before, s[MODEL.CONTACTS] + sizes[WATCHES])
-    is_kept = s[MODEL.CONSTRAINED] == 0 or sizes[START_HOLDS] > 0
-    if not is_kept and not projected(s, m.x, m.w, clock[0], y, f0, 0, h[ACCEPTED] / 10.0, inf):
+    after = at(before, model[MODEL.CONTACTS] + sizes[WATCHES])
+    is_kept = model[MODEL.CONSTRAINED] == 0 or sizes[START_HOLDS] > 0
+    if not is_kept and not projected(model, m.reals, m.data, clock[0], y, f0, 0, h[ACCEPTED] / 10.0, inf):
         return FAILED
     copy(size, y, y0)
     status = OUTCOME.OK if is_going else evaluated(m, clock[0], y0, f0, STAGE.ACCELERATION)
@@ -173,14 +173,14 @@ def run(m: Motion, y: Floats, is_going: bool) -> int:
         if sizes[MOST_LOGGED] > 0:
             note_step(m, t1, y1, f1)
         end, stopped = t1, False
-        h[IS_EVALUATED] = 1.0 if h[HAS_DERIVATIVE] == 0.0 and s[MODEL.CONSTRAINED] == 0 else 0.0
+        h[IS_EVALUATED] = 1.0 if h[HAS_DERIVATIVE] == 0.0 and model[MODEL.CONSTRAINED] == 0 else 0.0
         if sizes[MOST_EVENTS] > 0 or sizes[WATCHES] > 0:
             h[IS_EVALUATED] = 0.0
             levels_at(m, y1, after)
             end = note_events(m, t0, y0, f0, t1, y1, f1, before, after)
             stopped = end <= t1
             end = min(end, t1)
-            copy(s[MODEL.CONTACTS] + sizes[WATCHES], after, before)
+            copy(model[MODEL.CONTACTS] + sizes[WATCHES], after, before)
         while counts[REPORTED] < sizes[TIMES] and m.times[counts[REPORTED]] <= end:
             t, report = m.times[counts[REPORTED]], at(m.reports, size * counts[REPORTED])
             if t == t1:
@@ -204,22 +204,22 @@ def run(m: Motion, y: Floats, is_going: bool) -> int:
 
 def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
     """Whether the end of a step has a derivative, which a method may have found where no forces are looked at."""
-    if m.w[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0 and m.s[MODEL.CONTACTS] + m.sizes[WATCHES] == 0:
-        return is_finite(m.s[MODEL.STATE_SIZE], f1)
+    if m.data[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0 and m.model[MODEL.CONTACTS] + m.sizes[WATCHES] == 0:
+        return is_finite(m.model[MODEL.STATE_SIZE], f1)
     m.counts[EVALUATIONS] += 1
-    return evaluated(m, t1, y1, f1, STAGE.ACCELERATION) == OUTCOME.OK and is_finite(m.s[MODEL.STATE_SIZE], f1)
+    return evaluated(m, t1, y1, f1, STAGE.ACCELERATION) == OUTCOME.OK and is_finite(m.model[MODEL.STATE_SIZE], f1)
 
 
 def step(m: Motion, t0: float, y0: Floats, y1: Floats) -> float:
     """Find a step whose error is small enough: y1 and the time of its end; t0 - 1 if there is none, t0 if too many."""
     counts, clock, sizes = m.counts, m.clock, m.sizes
-    h = at(m.w, sizes[METHOD_AT])
+    h = at(m.data, sizes[METHOD_AT])
     smallest = max(shortest_step(t0, counts[ATTEMPTED]), h[SHORTEST])
     h[REACHED], h[NEXT_STEP] = t0, clock[1]
     while counts[ATTEMPTED] < sizes[MOST_TRIES]:
         tried = h[NEXT_STEP]
         counts[ATTEMPTED] += 1
-        call(sizes[METHOD], m.s, m.x, m.w, y0, y1, sizes[METHOD_AT])
+        call(sizes[METHOD], m.model, m.reals, m.data, y0, y1, sizes[METHOD_AT])
         counts[EVALUATIONS] += int(h[EVALUATED])
         clock[1] = h[NEXT_STEP]
         if h[REACHED] > t0:

@@ -57,7 +57,7 @@ class SOURCE(metaclass=Record):
     KIND, PLACE, MORE, SIZE = range(4)
 
 
-def felt(s: Ints, w: Floats, source: Ints, p: Floats, row: Floats) -> float:
+def felt(model: Ints, data: Floats, source: Ints, p: Floats, row: Floats) -> float:
     """What a source is, after a row is filled; p are the numbers that it has its own among."""
     kind, place = source[SOURCE.KIND], source[SOURCE.PLACE]
     if kind == IN_ROW:
@@ -67,53 +67,53 @@ def felt(s: Ints, w: Floats, source: Ints, p: Floats, row: Floats) -> float:
         return max(row[place] + SPINDLE_GAIN * (sqrt(speed) if speed > 0.0 else -sqrt(-speed)), 0.0)
     own = at(p, source[SOURCE.MORE])
     if kind == ANGLE:
-        xx, yx, zx = direction(s, w, place, vector(own, 0))
-        _, yy, _ = direction(s, w, place, vector(own, 3))
-        _, yz, _ = direction(s, w, place, vector(own, 6))
+        xx, yx, zx = direction(model, data, place, vector(own, 0))
+        _, yy, _ = direction(model, data, place, vector(own, 3))
+        _, yz, _ = direction(model, data, place, vector(own, 6))
         return dot(vector(own, 9), (atan2(-yz, yy), atan2(-zx, xx), atan2(yx, sqrt(xx * xx + zx * zx))))
     if kind == TURN:
-        return dot(direction(s, w, place, vector(own, 0)), angular_velocity(s, w, place))
-    point = station(s, w, place, vector(own, 0))
-    return dot(vector(own, 3), point if kind == POSITION else velocity(s, w, place, point))
+        return dot(direction(model, data, place, vector(own, 0)), angular_velocity(model, data, place))
+    point = station(model, data, place, vector(own, 0))
+    return dot(vector(own, 3), point if kind == POSITION else velocity(model, data, place, point))
 
 
-def feel(s: Ints, w: Floats, y: Floats, i: Ints, p: Floats, row: Floats) -> None:
+def feel(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, row: Floats) -> None:
     """Fill a row, after an evaluation of the state y."""
     muscles, freedoms, bodies = i[SENSES.MUSCLES], i[SENSES.COORDINATES], i[SENSES.BODIES]
     own, optimal = at(i, SENSES.HEAD), at(p, SENSED.HEAD)
     strengths = at(optimal, muscles)
     for k in range(muscles):
         places = at(own, OF_MUSCLE * k)
-        row[i[SENSES.LENGTHS] + k] = w[places[0]] / optimal[k]
-        row[i[SENSES.VELOCITIES] + k] = w[places[1]] / optimal[k]
-        row[i[SENSES.FORCES] + k] = w[places[2]] / strengths[k]
-        row[i[SENSES.ACTIVATIONS] + k] = w[places[3]]
-        row[i[SENSES.ACTIVE] + k] = w[places[4]]
+        row[i[SENSES.LENGTHS] + k] = data[places[0]] / optimal[k]
+        row[i[SENSES.VELOCITIES] + k] = data[places[1]] / optimal[k]
+        row[i[SENSES.FORCES] + k] = data[places[2]] / strengths[k]
+        row[i[SENSES.ACTIVATIONS] + k] = data[places[3]]
+        row[i[SENSES.ACTIVE] + k] = data[places[4]]
     copy(2 * freedoms, y, at(row, i[SENSES.VALUES]))
     limits, moments = at(own, OF_MUSCLE * muscles), at(row, i[SENSES.MOMENTS])
     for k in range(freedoms):
         moments[k] = 0.0
     for k in range(i[SENSES.LIMITS]):
-        moments[limits[2 * k]] = w[limits[2 * k + 1]]
+        moments[limits[2 * k]] = data[limits[2 * k + 1]]
     links, total, rise = at(limits, 2 * i[SENSES.LIMITS]), ZERO, 0.0
     centres = at(strengths, muscles + 2 * i[SENSES.CONTROLS])
     for k in range(bodies):
-        place = station(s, w, links[k], vector(centres, 3 * k))
+        place = station(model, data, links[k], vector(centres, 3 * k))
         put(row, i[SENSES.PLACES] + 3 * k, place)
         total = along(total, centres[3 * bodies + k], place)
-        rise += centres[3 * bodies + k] * velocity(s, w, links[k], place)[1]
+        rise += centres[3 * bodies + k] * velocity(model, data, links[k], place)[1]
     put(row, i[SENSES.CENTRE], over(total, p[SENSED.MASS]))
     row[i[SENSES.RISE]] = rise / p[SENSED.MASS]
     for k in range(i[SENSES.LEGS]):
         leg, push = at(links, bodies + OF_LEG * k), ZERO
         for pair in range(leg[2], leg[3]):
-            push = plus(push, contact_force(s, w, pair))
+            push = plus(push, contact_force(model, data, pair))
         row[i[SENSES.LOADS] + k] = norm(push) / p[SENSED.WEIGHT]
 
 
-def contact_force(s: Ints, w: Floats, pair: int) -> Vector:
+def contact_force(model: Ints, data: Floats, pair: int) -> Vector:
     """Force of a contact, N."""
-    return vector(w, s[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair + CONTACT_WORK.FORCE)
+    return vector(data, model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair + CONTACT_WORK.FORCE)
 
 
 def foot(i: Ints, row: Floats, leg: int) -> float:

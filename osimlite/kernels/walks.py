@@ -54,9 +54,9 @@ class Walk(NamedTuple):
 
 
 def hold_several(
-    s: Ints,
-    x: Floats,
-    w: Floats,
+    model: Ints,
+    reals: Floats,
+    data: Floats,
     sizes: Ints,
     clocks: Floats,
     counts: Ints,
@@ -76,19 +76,27 @@ def hold_several(
     """
     for k in range(first, last):
         for number in range(held_by):
-            x[places[number]] = controls[held_by * k + number]
-        m = motion_of(s, x, w, sizes, clocks, counts, peaks, places, k)
-        going[k] = 1 if held(m, at(states, s[MODEL.STATE_SIZE] * k), False) else 0
+            reals[places[number]] = controls[held_by * k + number]
+        m = motion_of(model, reals, data, sizes, clocks, counts, peaks, places, k)
+        going[k] = 1 if held(m, at(states, model[MODEL.STATE_SIZE] * k), False) else 0
     return OUTCOME.OK
 
 
 def motion_of(
-    s: Ints, x: Floats, w: Floats, sizes: Ints, clocks: Floats, counts: Ints, peaks: Floats, unused: Ints, k: int
+    model: Ints,
+    reals: Floats,
+    data: Floats,
+    sizes: Ints,
+    clocks: Floats,
+    counts: Ints,
+    peaks: Floats,
+    unused: Ints,
+    k: int,
 ) -> Motion:
     """Of one of several, which has no reports, log, events and watches."""
-    peak = at(peaks, 2 * k * s[MODEL.CONTACTS])
+    peak = at(peaks, 2 * k * model[MODEL.CONTACTS])
     clock, count = at(clocks, 2 * k), at(counts, COUNTED * k)
-    return Motion(s, x, w, sizes, clock, count, peak, peak, peak, peak, peak, peak, unused, peak)
+    return Motion(model, reals, data, sizes, clock, count, peak, peak, peak, peak, peak, peak, unused, peak)
 
 
 def held(m: Motion, y: Floats, is_going: bool) -> bool:
@@ -96,13 +104,13 @@ def held(m: Motion, y: Floats, is_going: bool) -> bool:
     m.clock[0] = 0.0
     for k in range(COUNTED):
         m.counts[k] = 0
-    return run(m, y, is_going) == DONE and is_finite(m.s[MODEL.STATE_SIZE], y)
+    return run(m, y, is_going) == DONE and is_finite(m.model[MODEL.STATE_SIZE], y)
 
 
 def walk_several(
-    s: Ints,
-    x: Floats,
-    w: Floats,
+    model: Ints,
+    reals: Floats,
+    data: Floats,
     sizes: Ints,
     clocks: Floats,
     counts: Ints,
@@ -131,9 +139,9 @@ def walk_several(
     Returns:
         What an evaluation says where something is only felt.
     """
-    size, status = s[MODEL.STATE_SIZE], OUTCOME.OK
+    size, status = model[MODEL.STATE_SIZE], OUTCOME.OK
     for k in range(first, last):
-        m = motion_of(s, x, w, sizes, clocks, counts, peaks, senses, k)
+        m = motion_of(model, reals, data, sizes, clocks, counts, peaks, senses, k)
         walk = Walk(
             m,
             senses,
@@ -161,16 +169,16 @@ def begun(a: Walk, y: Floats, order: int) -> int:
     """Feel what is at a state, and begin what is to begin."""
     m = a.m
     for k in range(a.senses[SENSES.CONTROLS]):
-        m.x[a.driven[k]] = 0.0
-    status = evaluated(m, 0.0, y, at(m.w, m.s[MODEL.WORK_STATE]), STAGE.FORCE)
+        m.reals[a.driven[k]] = 0.0
+    status = evaluated(m, 0.0, y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
     if status != OUTCOME.OK:
         return status
-    feel(m.s, m.w, y, a.senses, a.known, a.row)
+    feel(m.model, m.data, y, a.senses, a.known, a.row)
     if order == BEGIN:
         for k in range(LEGS):
             a.room[k] = UNKNOWN if a.plan[REFLEXES.HAS_STATES] > 0 else EARLY_STANCE
         a.progress[STEPS], a.progress[FRAMES], a.progress[GOING], a.progress[FORCES] = 0, 1, 1, 0
-        note_senses(m.s, m.w, a.plan, a.numbers, 0, a.row, at(a.room, LEGS))
+        note_senses(m.model, m.data, a.plan, a.numbers, 0, a.row, at(a.room, LEGS))
         excite(a)
     elif order == START:
         begin_criteria(a.senses, a.criteria, a.row, judged_room(a))
@@ -183,10 +191,10 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
     As in SCONE each can begin with the derivative that the one before has ended with, which knows its excitations only.
     """
     m, progress, lags = a.m, a.progress, a.known[SENSED.LAGS] > 0.0
-    size, controls = m.s[MODEL.STATE_SIZE], a.senses[SENSES.CONTROLS]
+    size, controls = m.model[MODEL.STATE_SIZE], a.senses[SENSES.CONTROLS]
     if lags:
         hold(a)
-        before = at(m.w, m.s[MODEL.WORK_STATE])
+        before = at(m.data, m.model[MODEL.WORK_STATE])
         copy(size, y, before)
         evaluated(m, a.known[SENSED.STEP], before, at(before, size), STAGE.ACCELERATION)
     for number in range(steps):
@@ -205,11 +213,11 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
         if not goes_on:
             progress[GOING] = 0
             return
-        if m.s[MODEL.CONTACTS] == 0 and m.w[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0:
+        if m.model[MODEL.CONTACTS] == 0 and m.data[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0:
             # The method has not looked at the forces at the end.
-            evaluated(m, m.clock[0], y, at(m.w, m.s[MODEL.WORK_STATE]), STAGE.FORCE)
-        feel(m.s, m.w, y, a.senses, a.known, a.row)
-        note_senses(m.s, m.w, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
+            evaluated(m, m.clock[0], y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
+        feel(m.model, m.data, y, a.senses, a.known, a.row)
+        note_senses(m.model, m.data, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
         progress[FRAMES] += 1
         t = progress[STEPS] * a.known[SENSED.STEP]
         if judged(a.senses, a.known, a.criteria, a.bounds, t, a.row, a.excitations, judged_room(a)):
@@ -219,7 +227,7 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
 def hold(a: Walk) -> None:
     """Give the actuators their controls."""
     for k in range(a.senses[SENSES.CONTROLS]):
-        a.m.x[a.driven[k]] = a.excitations[k]
+        a.m.reals[a.driven[k]] = a.excitations[k]
 
 
 def judged_room(a: Walk) -> Floats:
@@ -243,9 +251,9 @@ def excite(a: Walk) -> None:
 
 
 def run_by_reflexes(
-    s: Ints,
-    x: Floats,
-    w: Floats,
+    model: Ints,
+    reals: Floats,
+    data: Floats,
     each: int,
     sizes: Ints,
     clocks: Floats,
@@ -278,8 +286,8 @@ def run_by_reflexes(
     Args: as of `run_several`, and of `Walk`: one row for each run.
     """
     for k in range(first, last):
-        m = run_of(s, x, w, each, sizes, clocks, counts, states, times, reports, log, forces, events, peaks, watches,
-                   levels, k)  # fmt: skip
+        m = run_of(model, reals, data, each, sizes, clocks, counts, states, times, reports, log, forces, events, peaks,
+                   watches, levels, k)  # fmt: skip
         walk = Walk(
             m,
             senses,
@@ -295,7 +303,7 @@ def run_by_reflexes(
             at(record, plan[REFLEXES.ROWS] * k * decided_size(senses, plan)),
             at(progress, COUNTS * k),
         )
-        endings[k] = run_on(walk, at(states, k * s[MODEL.STATE_SIZE]))
+        endings[k] = run_on(walk, at(states, k * model[MODEL.STATE_SIZE]))
     return OUTCOME.OK
 
 
@@ -307,7 +315,7 @@ def decided_size(senses: Ints, plan: Ints) -> int:
 def run_on(a: Walk, y: Floats) -> int:
     """Go on from the state y, as `run` does, with controls that are new at each control step, also at the very end."""
     m, progress = a.m, a.progress
-    h = at(m.w, m.sizes[METHOD_AT])
+    h = at(m.data, m.sizes[METHOD_AT])
     end, ending = h[LAST_TIME], DONE
     while ending == DONE:
         if m.clock[0] >= progress[STEPS] * a.known[SENSED.STEP] and not decide(a, y):
@@ -327,13 +335,13 @@ def decide(a: Walk, y: Floats) -> bool:
     that the method would try next; whether the forces could be computed."""
     m, progress, sensors = a.m, a.progress, a.plan[REFLEXES.SENSORS]
     # No method knows what was, as the motion has a kink here.
-    at(m.w, m.sizes[METHOD_AT])[MEMORY] = 0.0
+    at(m.data, m.sizes[METHOD_AT])[MEMORY] = 0.0
     hold(a)
     m.counts[EVALUATIONS] += 1
-    if evaluated(m, m.clock[0], y, at(m.w, m.s[MODEL.WORK_STATE]), STAGE.FORCE) != OUTCOME.OK:
+    if evaluated(m, m.clock[0], y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE) != OUTCOME.OK:
         return False
-    feel(m.s, m.w, y, a.senses, a.known, a.row)
-    note_senses(m.s, m.w, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
+    feel(m.model, m.data, y, a.senses, a.known, a.row)
+    note_senses(m.model, m.data, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
     progress[FRAMES] += 1
     excite(a)
     row = progress[STEPS] - a.plan[REFLEXES.FIRST]

@@ -34,12 +34,12 @@ FIRST, SECOND, SHAPE = BEST, BEST + SECOND_TANGENT - FIRST_TANGENT, BEST + CURVE
 """In the record of a surface: the tangent points, and what the law has told of the way between them."""
 
 
-def trace_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Write all corners of a path that was measured into f, in ground; returns how many there are.
 
     After the wraps among the integers of the path stand the laws that trace it on each surface, or 0.
     """
-    i, result = at(s, item), at(w, s[item + ITEM.RECORD])
+    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     points, wraps = i[POINTS], i[WRAPS]
     size = points + 2 * wraps
     order, work = at(result, ORDER), at(result, ORDER + size)
@@ -52,7 +52,7 @@ def trace_path(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -
         wrap = (number - points) // 2
         if number >= points and number == points + 2 * wrap and own[WRAP_INTS * wraps + wrap] != 0:
             surface = item - own[WRAP_INTS * wrap + BACK]
-            count += call(own[WRAP_INTS * wraps + wrap], s, x, w, y, at(f, 3 * count), surface)
+            count += call(own[WRAP_INTS * wraps + wrap], model, reals, data, y, at(f, 3 * count), surface)
     return count
 
 
@@ -61,9 +61,9 @@ def pieces(angle: float) -> int:
     return int(min(1.0 + abs(angle) / ANGLE, MOST)) if not isnan(angle) else 1
 
 
-def trace_cylinder(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def trace_cylinder(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """A helix about z."""
-    e = at(w, s[item + ITEM.RECORD])
+    e = at(data, model[item + ITEM.RECORD])
     one, two, turn = vector(e, FIRST), vector(e, SECOND), e[SHAPE]
     count = pieces(turn)
     for k in range(1, count):
@@ -71,9 +71,9 @@ def trace_cylinder(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: in
     return count - 1
 
 
-def trace_torus(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def trace_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """A helix on the cylinder in the place of the ring."""
-    p, e = at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
+    p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     ring, outwards = p[SIZES + 1], (e[SHAPE + 1], e[SHAPE + 2], 0.0)
     one, two = in_cylinder(vector(e, FIRST), outwards, ring), in_cylinder(vector(e, SECOND), outwards, ring)
     count = pieces(e[SHAPE])
@@ -91,9 +91,9 @@ def on_helix(one: Vector, two: Vector, turn: float, part: float) -> Vector:
     return c * x - s * y, s * x + c * y, z + part * (end - z)
 
 
-def trace_sphere(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def trace_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """A great circle."""
-    e = at(w, s[item + ITEM.RECORD])
+    e = at(data, model[item + ITEM.RECORD])
     one, turn = vector(e, FIRST), e[SHAPE]
     across = cross(unit(cross(one, vector(e, SECOND))), one)
     count = pieces(turn)
@@ -103,9 +103,9 @@ def trace_sphere(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int)
     return count - 1
 
 
-def trace_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def trace_ellipsoid(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """The section with the plane of the path; nothing where OpenSim's points are none."""
-    p, e = at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
+    p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     a, b, c = vector(p, SIZES)
     factor = 3.0 / (a + b + c)
     one, two = times(factor, vector(e, FIRST)), times(factor, vector(e, SECOND))

@@ -43,9 +43,9 @@ BEND, ROUNDS = tan(radians(0.1)), 100
 """Tangent of the angle by which a line and the helix may differ where they meet; in so many rounds, at most."""
 
 
-def wrap_cylinder(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def wrap_cylinder(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """The law of a WrapCylinder, see :mod:`osimlite.kernels.wrapping`."""
-    p, e = at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
+    p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     first, second = vector(e, FIRST_END), vector(e, SECOND_END)
     return around_cylinder(first, second, p[SIZES], p[SIZES + 1], int(p[AXIS]), p[SIDE], p[ALONE] == 1.0, e)
 

@@ -63,9 +63,9 @@ EXACT, ROUNDS, TRIALS, STEPS = 1e-8, 50, 1000, 16.0
 step that is taken."""
 
 
-def wrap_ellipsoid(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def wrap_ellipsoid(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """The law of a WrapEllipsoid, see :mod:`osimlite.kernels.wrapping`."""
-    p, e = at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
+    p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     a, b, c = vector(p, SIZES)
     factor, axis, side = 3.0 / (a + b + c), int(p[AXIS]), p[SIDE]
     radii = times(factor, (a, b, c))

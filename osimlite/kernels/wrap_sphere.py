@@ -42,13 +42,13 @@ STRAIGHT = 1e-5
 """Sine of the angle between the line and the direction of the centre below which OpenSim finds no plane."""
 
 
-def wrap_sphere(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def wrap_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """The law of a WrapSphere, see :mod:`osimlite.kernels.wrapping`.
 
     As in OpenSim a line through the centre goes straight on, a length on the far side of the sphere is negative, and
     where a side is active a line must wrap only if its first end is less than 1 m from the middle of it.
     """
-    p, e = at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
+    p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     first, second, radius = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES]
     if norm(first) < radius or norm(second) < radius:
         return INSIDE

@@ -49,9 +49,9 @@ STEP = 1e-5
 DOWN = (0.0, 0.0, -1.0)
 
 
-def wrap_torus(s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> int:
+def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """The law of a WrapTorus about z, see :mod:`osimlite.kernels.wrapping`; a piece never must wrap."""
-    p, e = at(x, s[item + ITEM.NUMBERS]), at(w, s[item + ITEM.RECORD])
+    p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     first, second, ring = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES + 1]
     one, two = near_ring(first, second, ring), near_ring(second, first, ring)
     closer = distance_from_ring(one, ring) < distance_from_ring(two, ring)

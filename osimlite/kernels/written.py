@@ -11,6 +11,8 @@ from osimlite.kernels.layout import ITEM, MODEL, OUTCOME, RUN, WORK
 
 RECORDS = {record.__name__: record for record in (MODEL, ITEM, RUN, WORK, OUTCOME)}
 """What the code of kernels uses of the layout."""
+GIVEN = 'model: "Ints", reals: "Floats", data: "Floats", y: "Floats", f: "Floats"'
+"""What every kernel is called with, before what it computes."""
 
 
 def written(name: str, module: str, source: str, **scope: Any) -> Callable[..., int]:

@@ -87,35 +87,35 @@ class MassCentres:
 
 def mass_matrix(state: Kinematics) -> Array:
     """M (n, n) of the kinetic energy ½ uᵀ M u."""
-    program, w = state.program, _weighed(state, np.zeros(3))
-    with numbers(w):
-        composite_rigid_body(program.s, w, floats([0.0] * len(state.q)))
-    return program.mass_matrix(w)
+    program, data = state.program, _weighed(state, np.zeros(3))
+    with numbers(data):
+        composite_rigid_body(program.model, data, floats([0.0] * len(state.q)))
+    return program.mass_matrix(data)
 
 
 def missing_forces(state: Kinematics, udot: Array, gravity: Array) -> Array:
     """Generalized forces (n,) that give the speeds the derivatives `udot` (n,) against `gravity` (3,)."""
     program = state.program
-    s, udots = program.s, floats(udot[program.order].tolist())
-    w, missing = _weighed(state, gravity, udots), floats([0.0] * len(udot))
-    with numbers(w):
-        generalized_forces(s, w, missing)
+    model, udots = program.model, floats(udot[program.order].tolist())
+    data, missing = _weighed(state, gravity, udots), floats([0.0] * len(udot))
+    with numbers(data):
+        generalized_forces(model, data, missing)
     return -np.array(missing)[program.freedoms]
 
 
 def _weighed(state: Kinematics, gravity: Array, udot: Floats | None = None) -> Floats:
     """The work vector with the inertias of the links, and the wrenches that are missing for their accelerations."""
-    s, x, w = state.program.s, state.program.x, floats(state.vectors[0].tobytes())
-    with numbers(w):
-        for link in range(s[MODEL.LINKS]):
-            acceleration = link_work(s, w, link)[LINK_WORK.ACCELERATION + 3 :]
+    model, reals, data = state.program.model, state.program.reals, floats(state.vectors[0].tobytes())
+    with numbers(data):
+        for link in range(model[MODEL.LINKS]):
+            acceleration = link_work(model, data, link)[LINK_WORK.ACCELERATION + 3 :]
             # In place of gravity, links are pushed upwards.
             for k, part in enumerate(gravity.tolist()):
                 acceleration[k] -= part
         if udot is not None:
-            accelerate(s, w, udot)
-        spatial_inertias_and_bias(s, x, w)
-    return w
+            accelerate(model, data, udot)
+        spatial_inertias_and_bias(model, reals, data)
+    return data
 
 
 def accelerations(state: Kinematics, applied: Array) -> Array:
@@ -129,21 +129,21 @@ def accelerations(state: Kinematics, applied: Array) -> Array:
         SimulationError: a motion that nothing forbids moves no mass, or something is no number.
     """
     program, mechanism, size = state.program, state.mechanism, len(state.q)
-    s, w = program.s, _weighed(state, mechanism.gravity)
+    model, data = program.model, _weighed(state, mechanism.gravity)
     _, y, f = state.vectors
     derivative = floats([*f[:size], *applied[program.order].tolist()])
     right = at(derivative, size)
-    with numbers(w):
-        composite_rigid_body(s, w, right)
-    matrix = program.mass_matrix(w)
+    with numbers(data):
+        composite_rigid_body(model, data, right)
+    matrix = program.mass_matrix(data)
     require_numbers(mechanism, matrix, np.array(right))
     require_numbers(mechanism, *state.all_equations[1:])
     status = OUTCOME.SINGULAR_MASS
     with suppress(ArithmeticError, ValueError):
         if not size or not program.constraints:
-            status = OUTCOME.OK if solve(s, w, right) < 0 else OUTCOME.SINGULAR_MASS
+            status = OUTCOME.OK if solve(model, data, right) < 0 else OUTCOME.SINGULAR_MASS
         else:
-            status = constrained_dynamics(s, program.heavy, w, y, derivative, 0)
+            status = constrained_dynamics(model, program.heavy, data, y, derivative, 0)
     udot: Array = np.array(right)[program.freedoms]
     if status != OUTCOME.OK or (size and not np.isfinite(udot).all()):
         raise massless(_name_of_massless(mechanism, matrix, state.all_equations.rows))

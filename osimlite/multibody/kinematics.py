@@ -30,12 +30,12 @@ Vectors = tuple[Floats, Floats, Floats]
 
 
 @contextmanager
-def numbers(w: Floats) -> Iterator[None]:
+def numbers(data: Floats) -> Iterator[None]:
     """Whatever Python cannot compute, as an angle that is infinite, leaves no numbers in a work vector."""
     try:
         yield
     except (ArithmeticError, ValueError):
-        np.frombuffer(w)[WORK.SIZE :] = np.nan
+        np.frombuffer(data)[WORK.SIZE :] = np.nan
 
 
 class Kinematics:
@@ -63,18 +63,18 @@ class Kinematics:
 
     @cached_property
     def _unmoved(self) -> Vectors:
-        w, y, f = self.program.state(self.q, self.u)
-        w[WORK.TIME] = self.time
-        return w, y, f
+        data, y, f = self.program.state(self.q, self.u)
+        data[WORK.TIME] = self.time
+        return data, y, f
 
     @cached_property
     def vectors(self) -> Vectors:
         """Work vector, state, and rates, when the links have been moved; no numbers where they cannot be."""
-        s, x, (w, y, f) = self.program.s, self.program.x, self._unmoved
-        with numbers(w):
-            place(s, x, w, y, f)
-            move(s, x, w, y, f)
-        return w, y, f
+        model, reals, (data, y, f) = self.program.model, self.program.reals, self._unmoved
+        with numbers(data):
+            place(model, reals, data, y, f)
+            move(model, reals, data, y, f)
+        return data, y, f
 
     def equations(self, constraint: Constraint) -> Equations:
         """The equations of a constraint."""
@@ -95,11 +95,11 @@ class Kinematics:
         for ball in balls:
             # The rates of its coordinates must be defined.
             ball.rate_matrix(self.q[list(ball.coordinates)])
-        w, y, f = self.vectors if balls or program.on_bodies else self._unmoved
+        data, y, f = self.vectors if balls or program.on_bodies else self._unmoved
         if program.constraints:
-            with numbers(w):
-                bind(program.s, program.x, w, y, f)
-        return program.equations(w)
+            with numbers(data):
+                bind(program.model, program.reals, data, y, f)
+        return program.equations(data)
 
     @cached_property
     def rotations(self) -> Array:
@@ -117,7 +117,7 @@ class Kinematics:
     def jacobians(self) -> Array:
         """From the n speeds to the velocity of each body (b + 1, 6, n)."""
         program, size = self.program, len(self.q)
-        first = program.s[MODEL.WORK_COLUMN]
+        first = program.model[MODEL.WORK_COLUMN]
         columns = np.frombuffer(self.vectors[0])[first : first + 6 * size].reshape(size, 6)[program.freedoms].T
         result = np.empty((len(program.links), 6, size))
         result[:, :3], result[:, 3:] = columns[:3], columns[3:] - skews(self._arms) @ columns[:3]
@@ -143,8 +143,8 @@ class Kinematics:
     @cached_property
     def _links(self) -> Array:
         """What the kernels find of the link of each body, and of ground as the last (b + 1, LINK_WORK.SIZE)."""
-        s = self.program.s
-        first, count, size = s[MODEL.WORK_LINK], s[MODEL.LINKS], LINK_WORK.SIZE
+        model = self.program.model
+        first, count, size = model[MODEL.WORK_LINK], model[MODEL.LINKS], LINK_WORK.SIZE
         result = np.zeros((count + 1, size))
         result[:-1] = np.frombuffer(self.vectors[0])[first : first + size * count].reshape(count, size)
         result[-1, [0, 4, 8]] = 1.0

@@ -57,10 +57,10 @@ class Program:
         for name in self.laws:
             ints[MODEL.LAWS + LAW_NUMBERS[name]] = address(own_function(name))
         integers: Any = memoryview(array("q", ints))
-        self.s: Ints = integers
-        self.x, self.heavy = floats(packer.numbers), floats(packer.numbers)
+        self.model: Ints = integers
+        self.reals, self.heavy = floats(packer.numbers), floats(packer.numbers)
         for k in range(GRAVITY_AT, GRAVITY_AT + 3):
-            self.x[k] = 0.0
+            self.reals[k] = 0.0
         self.order = list(order)
         self.freedoms = np.argsort(order)
         self.constraints = {id(item): number for number, item in enumerate(constraints)}
@@ -83,16 +83,16 @@ class Program:
 
     def equations_of(self, constraint: Constraint) -> tuple[int, int, int]:
         """First and end of the equations of a constraint of its own, and the end of those that bind positions."""
-        s = self.s
+        s = self.model
         at = s[s[s[MODEL.CONSTRAINED] + CONSTRAINED.CONSTRAINT_AT] + self.constraints[id(constraint)]]
         return tuple(s[at + k] for k in _ENDS)
 
-    def equations(self, w: Floats) -> Equations:
+    def equations(self, data: Floats) -> Equations:
         """All equations as they stand in a work vector."""
         size = len(self.order)
         if not self.constraints:
             return Equations(np.zeros(0), np.zeros((0, size)), np.zeros(0), np.zeros(0))
-        h, vector = self.s[self.s[MODEL.CONSTRAINED] :], np.frombuffer(w)
+        h, vector = self.model[self.model[MODEL.CONSTRAINED] :], np.frombuffer(data)
         count = h[CONSTRAINED.EQUATIONS]
         rows = vector[h[CONSTRAINED.WORK_ROWS] :][: count * size].reshape(count, size)[:, self.freedoms]
         places = (CONSTRAINED.WORK_ERRORS, CONSTRAINED.WORK_RATES, CONSTRAINED.WORK_DRIFTS)
@@ -112,7 +112,7 @@ class Program:
     @cached_property
     def _entries(self) -> NDArray[np.int_]:
         """Row, column, and place in the work vector of each entry of the mass matrix that is not zero (3, k)."""
-        s, entries = self.s, []
+        s, entries = self.model, []
         for freedom in range(len(self.order)):
             record = s[s[MODEL.DOF_AT] + DOF.SIZE * freedom :]
             above, place = freedom, record[DOF.ROW]
@@ -121,14 +121,14 @@ class Program:
                 above, place = s[s[MODEL.DOF_AT] + DOF.SIZE * above + DOF.ABOVE], place + 1
         return np.array(entries, dtype=int).reshape(-1, 3).T
 
-    def mass_matrix(self, w: Floats) -> Array:
+    def mass_matrix(self, data: Floats) -> Array:
         """The mass matrix (n, n) as it stands in a work vector."""
         (rows, columns, places), size = self._entries, len(self.order)
         matrix = np.zeros((size, size))
-        matrix[rows, columns] = matrix[columns, rows] = np.frombuffer(w)[places]
+        matrix[rows, columns] = matrix[columns, rows] = np.frombuffer(data)[places]
         return matrix
 
     def state(self, q: Array, u: Array) -> tuple[Floats, Floats, Floats]:
         """A work vector for a state, the state, and its rates, as they are but for balls."""
         values, speeds = q[self.order].tolist(), u[self.order].tolist()
-        return floats(bytes(8 * self.s[MODEL.WORK_SIZE])), floats([*values, *speeds]), floats([*speeds, *speeds])
+        return floats(bytes(8 * self.model[MODEL.WORK_SIZE])), floats([*values, *speeds]), floats([*speeds, *speeds])

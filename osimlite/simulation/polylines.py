@@ -71,7 +71,7 @@ class Polylines:
     def __init__(self, mechanism: Mechanism, routes: Sequence[Course]) -> None:
         program = self.program = mechanism.program
         self.laws, self.items, self.traces = [""], list[int](), list[int]()
-        ints, numbers, self.work, self.room = [*program.s], [*program.x], program.s[MODEL.WORK_SIZE], 0
+        ints, numbers, self.work, self.room = [*program.model], [*program.reals], program.model[MODEL.WORK_SIZE], 0
         self.bound = bool(routes) and not all(isinstance(item, Lock) for item in mechanism.constraints)
         unused = {*OF_MOTIONS, *(() if routes else OF_SPEEDS), *(() if self.bound else OF_CONSTRAINTS)}
         for name in program.laws:

@@ -64,15 +64,15 @@ class ConstraintForces:
         bodies = [body for body in constraint.bodies if body != GROUND]
         held: Any = constraint
         program = _apart(mechanism, held)
-        w, y, f = program.state(np.zeros(6 * len(mechanism.bodies)), np.zeros(6 * len(mechanism.bodies)))
-        columns = np.frombuffer(w)[program.s[MODEL.WORK_COLUMN] :]
+        data, y, f = program.state(np.zeros(6 * len(mechanism.bodies)), np.zeros(6 * len(mechanism.bodies)))
+        columns = np.frombuffer(data)[program.model[MODEL.WORK_COLUMN] :]
         for body in bodies:
             columns[36 * body : 36 * body + 36] = np.eye(6).ravel()
-            here = np.frombuffer(link_work(program.s, w, body))
+            here = np.frombuffer(link_work(program.model, data, body))
             here[: LINK_WORK.POSITION] = state.rotations[body].ravel()
             here[LINK_WORK.POSITION : LINK_WORK.VELOCITY] = *state.origins[body], *state.origins[body]
-        bind(program.s, program.x, w, y, f)
-        wrenches = (multipliers @ program.equations(w).rows).reshape(-1, 6)
+        bind(program.model, program.reals, data, y, f)
+        wrenches = (multipliers @ program.equations(data).rows).reshape(-1, 6)
         # What pushes ground pushes back at the other bodies.
         force = -wrenches[bodies, 3:].sum(axis=0)
         torque = -(wrenches[bodies, :3] + np.cross(state.origins[bodies], wrenches[bodies, 3:])).sum(axis=0)

@@ -208,25 +208,27 @@ class _Meshes:
     one: Placement  # where the body of surface 1 is in its link
     two: Placement  # where the body of surface 2 is in its link
 
-    def __call__(self, s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, item: int) -> None:
+    def __call__(self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> None:
         """Compute and apply the contact."""
-        w[s[item + ITEM.RECORD] :][:MESH_WORK] = 0.0
-        one, two = self._pose(s, w, self.one), self._pose(s, w, self.two)
+        data[model[item + ITEM.RECORD] :][:MESH_WORK] = 0.0
+        one, two = self._pose(model, data, self.one), self._pose(model, data, self.two)
         first, second = self.springs.one, self.springs.two
         about, other = two.points(np.array(second.center)), one.points(np.array(first.center))
         point: Vector = tuple(about.tolist())
         load: Load = ZERO, ZERO, 0.0
         if np.linalg.norm(about - other) < first.radius + second.radius:
             links = self.one.link, self.two.link
-            v = minus(*(velocity(s, w, link, point) for link in links))
-            load = self.springs.load(one, two, point, v, minus(*(angular_velocity(s, w, link) for link in links)))
-        load_mesh(s, w, item, point, *load)
+            v = minus(*(velocity(model, data, link, point) for link in links))
+            load = self.springs.load(
+                one, two, point, v, minus(*(angular_velocity(model, data, link) for link in links))
+            )
+        load_mesh(model, data, item, point, *load)
 
     @staticmethod
-    def _pose(s: Ints, w: Floats, placement: Placement) -> Pose:
+    def _pose(model: Ints, data: Floats, placement: Placement) -> Pose:
         link, frame = placement
         if link < 0:
             return Pose(frame[:3, :3], frame[:3, 3])
-        start = s[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
-        origin = np.array(station(s, w, link, triple(frame[:3, 3])))
-        return Pose(w[start : start + 9].reshape(3, 3) @ frame[:3, :3], origin)
+        start = model[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
+        origin = np.array(station(model, data, link, triple(frame[:3, 3])))
+        return Pose(data[start : start + 9].reshape(3, 3) @ frame[:3, :3], origin)

@@ -42,7 +42,7 @@ class Item:
     equilibrium: str = ""  # name of the kernel that brings its states into equilibrium, if they have one
     response: Response | None = None  # of a force along one displacement
     abreast: str = ""  # name of the kernel that computes several that follow one another, if there is one
-    # what computes it in place of a kernel, called with (s, x, w, y, f, place of the item) as arrays
+    # what computes it in place of a kernel, called with (model, reals, data, y, f, place of the item) as arrays
     python: Callable[..., None] | None = None
 
 

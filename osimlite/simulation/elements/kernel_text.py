@@ -11,7 +11,7 @@ from osimlite.forces.carried import carrying, carrying_room, slope_of
 from osimlite.kernels.condensation import WIDTH
 from osimlite.kernels.curves_abreast import LANES, answer, ask, ask_sum, missed_of, value_of
 from osimlite.kernels.layout import ITEM
-from osimlite.kernels.written import written
+from osimlite.kernels.written import GIVEN, written
 from osimlite.records import dataclass
 from osimlite.simulation.elements.laws import ABREAST, EQUILIBRIUM, OFF, RESPONSE, RIGID
 
@@ -120,7 +120,7 @@ class KernelText:
             ]
         # A rate may have the name of an output of another meaning, such as that of a state.
         lines = [f"{', '.join(f'{name}_0' for name in kind.outputs)} = {self._call(arguments)}"]
-        lines += [f"{force} = 1.0", *kind.geometry.after, "change = at(w, WORK.SCRATCH)"]
+        lines += [f"{force} = 1.0", *kind.geometry.after, "change = at(data, WORK.SCRATCH)"]
         for row, name in enumerate(rows):
             for column in range(WIDTH):
                 value = f"slope_of({name}_0, {directions[column]})" if column in directions else "0.0"
@@ -149,7 +149,7 @@ class KernelText:
             places[name], number = f"i[ITEM.NUMBERS] + {number}", number + term.size
         count = len(first.curves)
         asks = [
-            f"ask(x, lanes, asked + {k}, {places[curve]}, {known[name]})"
+            f"ask(reals, lanes, asked + {k}, {places[curve]}, {known[name]})"
             for k, (curve, name) in enumerate(first.curves.items())
         ]
         lines = ["asked = 0", *self._each([*kind.geometry.before, *self._noted(inputs), begin, *asks,
@@ -164,9 +164,9 @@ class KernelText:
             f"which, of_curve, of_argument, total = asking({told})",
             f"place = {place}",
             "if of_curve == 0.0 and of_argument == 1.0:",
-            "    ask(x, lanes, asked, place, total)",
+            "    ask(reals, lanes, asked, place, total)",
             "else:",
-            "    ask_sum(x, lanes, asked, place, of_curve, of_argument, total)",
+            "    ask_sum(reals, lanes, asked, place, of_curve, of_argument, total)",
             "asked += 1",
         ])]  # fmt: skip
         lines += [f"answer(lanes, asked, {SOUGHT_ROUNDS})", "asked = 0"]
@@ -179,9 +179,9 @@ class KernelText:
             ABREAST,
             "run",
             [
-                "lanes, first = at(w, s[run + RUN.ROOM]), s[run + RUN.FIRST]",
-                "while first < s[run + RUN.END]:",
-                f"    end_of_part = min(first + {LANES // count}, s[run + RUN.END])",
+                "lanes, first = at(data, model[run + RUN.ROOM]), model[run + RUN.FIRST]",
+                "while first < model[run + RUN.END]:",
+                f"    end_of_part = min(first + {LANES // count}, model[run + RUN.END])",
                 *(f"    {line}" for line in lines),
                 "    first = end_of_part",
             ],
@@ -196,7 +196,7 @@ class KernelText:
         told = [new for line in lines for new in (("    f[0] = number", line) if line == refused else (line,))]
         return [
             "for number in range(first, end_of_part):",
-            "    item = s[s[MODEL.ITEM_AT] + number]",
+            "    item = model[model[MODEL.ITEM_AT] + number]",
             *(f"    {line}" for line in (*self._places_of_item, *told)),
         ]
 
@@ -223,8 +223,8 @@ class KernelText:
     def _places_of_item(self) -> list[str]:
         recorded = len(self.kind.recorded)
         return [
-            "i = at(s, item)",
-            "p, found = at(x, i[ITEM.NUMBERS]), at(w, i[ITEM.RECORD])",
+            "i = at(model, item)",
+            "p, found = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])",
             f"g, gp, room = at(i, {ITEM.OWN + self.heads}), at(p, {self.size}), at(found, {recorded})",
         ]
 
@@ -232,7 +232,7 @@ class KernelText:
         kind, name = self.kind, self.kind.name + form
         source = "\n    ".join(
             [
-                f'def {name}(s: "Ints", x: "Floats", w: "Floats", y: "Floats", f: "Floats", {place}: "int") -> "int":',
+                f'def {name}({GIVEN}, {place}: "int") -> "int":',
                 *lines,
                 "return OUTCOME.OK\n",
             ]

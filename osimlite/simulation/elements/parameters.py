@@ -307,7 +307,7 @@ class Control(Parameter):
 
     def arguments(self, head: int, number: int) -> list[str]:
         """They, one by one."""
-        return [f"w[s[MODEL.WORK_CONTROL] + i[{head}] + {k}]" for k in range(self.count)]
+        return [f"data[model[MODEL.WORK_CONTROL] + i[{head}] + {k}]" for k in range(self.count)]
 
     def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
         """The number."""
@@ -327,7 +327,7 @@ class ReflexControl(Control):
 
     def arguments(self, head: int, number: int) -> list[str]:
         """The control."""
-        return [f"with_reflex(w, s[MODEL.WORK_CONTROL] + i[{head}], p[{number}], rate)"]
+        return [f"with_reflex(data, model[MODEL.WORK_CONTROL] + i[{head}], p[{number}], rate)"]
 
     def functions(self) -> dict[str, Callable[..., Any]]:
         """What adds."""

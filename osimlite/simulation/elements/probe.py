@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from osimlite._load import module_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.kernels.layout import ITEM
-from osimlite.kernels.written import written
+from osimlite.kernels.written import GIVEN, written
 from osimlite.multibody.function_tables import table_of_one
 from osimlite.multibody.functions import Function
 from osimlite.multibody.links import Places
@@ -88,13 +88,13 @@ class ProbeKind:
     def source(self) -> str:
         """The text of the kernel."""
         size, count = len(self.numbers._fields), len(self.reads)
-        given = [f"w[a[{k}]]" for k in range(count)]
+        given = [f"data[a[{k}]]" for k in range(count)]
         given += [f"at(p, i[{HEAD - 1}])"] if self.has_curve else []
         given.append(f"{self.numbers.__name__}({', '.join(f'b[{k}]' for k in range(size))})")
         lines = [
-            f'def {self.name}(s: "Ints", x: "Floats", w: "Floats", y: "Floats", f: "Floats", item: "int") -> "int":',
-            "i = at(s, item)",
-            "p, found = at(x, i[ITEM.NUMBERS]), at(w, i[ITEM.RECORD])",
+            f'def {self.name}({GIVEN}, item: "int") -> "int":',
+            "i = at(model, item)",
+            "p, found = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])",
             "first, total = i[ITEM.OWN + 1], p[0]",
             "for k in range(i[ITEM.OWN]):",
             f"    a, b = at(i, {HEAD} + {count} * k), at(p, 1 + {size} * k)",

@@ -53,13 +53,13 @@ def _at(context: Any, vector: Any, place: Any) -> Any:
 
 
 @intrinsic
-def _call(context: Any, address: Any, s: Any, x: Any, w: Any, y: Any, f: Any, place: Any) -> Any:
+def _call(context: Any, address: Any, model: Any, reals: Any, data: Any, y: Any, f: Any, place: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         parts = [context.get_value_type(part) for part in signature.args[1:]]
         function = ir.FunctionType(context.get_value_type(types.int64), parts)
         return builder.call(builder.inttoptr(arguments[0], function.as_pointer()), arguments[1:])
 
-    return types.int64(types.int64, s, x, w, y, f, types.int64), generate
+    return types.int64(types.int64, model, reals, data, y, f, types.int64), generate
 
 
 INSTRUCTIONS: dict[Any, Any] = {pointers.at: _at, pointers.call: _call, **tangents.INSTRUCTIONS}

@@ -17,64 +17,70 @@ from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 
-def turn_bodies(s: Ints, w: Floats, g: Ints, gp: Floats, torque: float) -> None:
+def turn_bodies(model: Ints, data: Floats, g: Ints, gp: Floats, torque: float) -> None:
     """Turn a body about an axis, and another the other way."""
-    axis = direction(s, w, g[2], vector(gp, 0))
-    apply_torque(s, w, g[0], times(torque, axis))
-    apply_torque(s, w, g[1], times(-torque, axis))
+    axis = direction(model, data, g[2], vector(gp, 0))
+    apply_torque(model, data, g[0], times(torque, axis))
+    apply_torque(model, data, g[1], times(-torque, axis))
 
 
-def turning_speed(s: Ints, w: Floats, g: Ints, gp: Floats) -> float:
+def turning_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
     """How fast a body turns against another about an axis (rad/s), which OpenSim takes for one of ground."""
-    return dot(vector(gp, 3), minus(angular_velocity(s, w, g[0]), angular_velocity(s, w, g[1])))
+    return dot(vector(gp, 3), minus(angular_velocity(model, data, g[0]), angular_velocity(model, data, g[1])))
 
 
-def push_along(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:
+def push_along(model: Ints, data: Floats, g: Ints, gp: Floats, force: float) -> None:
     """Push a body along a direction at a point."""
-    apply_force(s, w, g[0], station(s, w, g[1], vector(gp, 0)), times(force, direction(s, w, g[3], vector(gp, 6))))
+    apply_force(
+        model,
+        data,
+        g[0],
+        station(model, data, g[1], vector(gp, 0)),
+        times(force, direction(model, data, g[3], vector(gp, 6))),
+    )
 
 
-def station_speed(s: Ints, w: Floats, g: Ints, gp: Floats) -> float:
+def station_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
     """How fast a station moves (m/s), in whatever direction, which is what OpenSim takes."""
-    return norm(velocity(s, w, g[2], station(s, w, g[2], vector(gp, 3))))
+    return norm(velocity(model, data, g[2], station(model, data, g[2], vector(gp, 3))))
 
 
-def push_apart(s: Ints, w: Floats, g: Ints, gp: Floats, force: float) -> None:
+def push_apart(model: Ints, data: Floats, g: Ints, gp: Floats, force: float) -> None:
     """Push two points apart."""
-    point = station(s, w, g[2], vector(gp, 0))
-    between = minus(point, station(s, w, g[3], vector(gp, 3)))
+    point = station(model, data, g[2], vector(gp, 0))
+    between = minus(point, station(model, data, g[3], vector(gp, 3)))
     length = norm(between)
     size = force / length if length > 0.0 else 0.0
-    apply_force(s, w, g[0], point, times(size, between))
-    apply_force(s, w, g[1], point, times(-size, between))
+    apply_force(model, data, g[0], point, times(size, between))
+    apply_force(model, data, g[1], point, times(-size, between))
 
 
-def parting_speed(s: Ints, w: Floats, g: Ints, gp: Floats) -> float:
+def parting_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
     """How fast two points part, m/s."""
-    one, two = station(s, w, g[2], vector(gp, 0)), station(s, w, g[3], vector(gp, 3))
-    between, parting = minus(one, two), minus(velocity(s, w, g[2], one), velocity(s, w, g[3], two))
+    one, two = station(model, data, g[2], vector(gp, 0)), station(model, data, g[3], vector(gp, 3))
+    between, parting = minus(one, two), minus(velocity(model, data, g[2], one), velocity(model, data, g[3], two))
     length = norm(between)
     return dot(parting, between) / length if length > 0.0 else 0.0
 
 
-def push_body(s: Ints, w: Floats, g: Ints, gp: Floats, torque: Vector, force: Vector) -> None:
+def push_body(model: Ints, data: Floats, g: Ints, gp: Floats, torque: Vector, force: Vector) -> None:
     """Turn a body, and push it at a point; torque and force are along three axes, which are given by rows."""
-    apply_torque(s, w, g[0], direction(s, w, g[2], turned_back(at(gp, 3), torque)))
-    point = station(s, w, g[1], vector(gp, 0))
-    apply_force(s, w, g[0], point, direction(s, w, g[2], turned_back(at(gp, 3), force)))
+    apply_torque(model, data, g[0], direction(model, data, g[2], turned_back(at(gp, 3), torque)))
+    point = station(model, data, g[1], vector(gp, 0))
+    apply_force(model, data, g[0], point, direction(model, data, g[2], turned_back(at(gp, 3), force)))
 
 
-def station_motion(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, float, float]:
+def station_motion(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, float, float]:
     """Height of a station in ground, and its velocity; its place goes into the record."""
-    point = station(s, w, g[0], vector(gp, 0))
+    point = station(model, data, g[0], vector(gp, 0))
     put(room, 0, point)
-    vx, vy, vz = velocity(s, w, g[0], point)
+    vx, vy, vz = velocity(model, data, g[0], point)
     return room[1], vx, vy, vz
 
 
-def push_station(s: Ints, w: Floats, g: Ints, room: Floats, force: Vector) -> None:
+def push_station(model: Ints, data: Floats, g: Ints, room: Floats, force: Vector) -> None:
     """Push a station; the record then has the force."""
-    apply_force(s, w, g[0], vector(room, 0), force)
+    apply_force(model, data, g[0], vector(room, 0), force)
     put(room, 0, force)
 
 
@@ -113,8 +119,8 @@ class AboutAxis(OnBodies):
 
     inputs = ("speed",)
     speed = "speed"
-    before = ("speed = turning_speed(s, w, g, gp)",)
-    after = ("turn_bodies(s, w, g, gp, torque)",)
+    before = ("speed = turning_speed(model, data, g, gp)",)
+    after = ("turn_bodies(model, data, g, gp, torque)",)
     calls = (turning_speed, turn_bodies)
 
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
@@ -133,8 +139,8 @@ class AtPoint(OnBodies):
 
     inputs = ("speed",)
     speed = "speed"
-    before = ("speed = station_speed(s, w, g, gp)",)
-    after = ("push_along(s, w, g, gp, force)",)
+    before = ("speed = station_speed(model, data, g, gp)",)
+    after = ("push_along(model, data, g, gp, force)",)
     calls = (station_speed, push_along)
 
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
@@ -152,8 +158,8 @@ class ApartPoints(OnBodies):
 
     inputs = ("speed",)
     speed = "speed"
-    before = ("speed = parting_speed(s, w, g, gp)",)
-    after = ("push_apart(s, w, g, gp, force)",)
+    before = ("speed = parting_speed(model, data, g, gp)",)
+    after = ("push_apart(model, data, g, gp, force)",)
     calls = (parting_speed, push_apart)
 
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
@@ -169,7 +175,7 @@ class ApartPoints(OnBodies):
 class OnBody(OnBodies):
     """A body: the outputs tx, ty, tz (N.m) turn it, and fx, fy, fz (N) push it at a point."""
 
-    after = ("push_body(s, w, g, gp, (tx, ty, tz), (fx, fy, fz))",)
+    after = ("push_body(model, data, g, gp, (tx, ty, tz), (fx, fy, fz))",)
     calls = (push_body,)
 
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
@@ -193,8 +199,8 @@ class AtStation(Geometry):
     """A station: its height y (m) and velocity in ground; the outputs fx, fy, fz (N) push it."""
 
     inputs = ("height", "vx", "vy", "vz")
-    before = ("height, vx, vy, vz = station_motion(s, w, g, gp, room)",)
-    after = ("push_station(s, w, g, room, (fx, fy, fz))",)
+    before = ("height, vx, vy, vz = station_motion(model, data, g, gp, room)",)
+    after = ("push_station(model, data, g, room, (fx, fy, fz))",)
     calls = (station_motion, push_station)
 
     def read(self, builder: ElementBuilder, force: Any) -> NamedStation:

@@ -13,11 +13,11 @@ from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 
-def coordinate(s: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, float]:
+def coordinate(model: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, float]:
     """Value and speed of a coordinate, which has its own value if it is locked."""
     if g[0] < 0:
         return gp[0], 0.0
-    return y[g[0]], y[s[MODEL.DOFS] + g[0]]
+    return y[g[0]], y[model[MODEL.DOFS] + g[0]]
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class OnCoordinate(Geometry):
     inputs = ("q", "u")
     speed = "u"
     along = "force", 1
-    before = ("q, u = coordinate(s, y, g, gp)",)
-    after = ("if g[0] >= 0:", "    f[s[MODEL.DOFS] + g[0]] += force")
+    before = ("q, u = coordinate(model, y, g, gp)",)
+    after = ("if g[0] >= 0:", "    f[model[MODEL.DOFS] + g[0]] += force")
     calls = (coordinate,)
 
     def read(self, builder: ElementBuilder, force: Any) -> int:

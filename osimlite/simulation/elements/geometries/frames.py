@@ -21,36 +21,36 @@ DEVIATIONS, LOADS, RATES, AXES, ROOM = 12, 18, 24, 30, 48
 """Places in the record, after force and moment on the second frame and the origins of both; the axes are of both."""
 
 
-def deviate(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> None:
+def deviate(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats) -> None:
     """Deviations of the second frame from the first, and their rates, which go into the record."""
     d, rates = at(room, DEVIATIONS), at(room, RATES)
     for k in range(3):
-        put(room, AXES + 3 * k, direction(s, w, g[0], vector(gp, 3 * k)))
-        put(room, AXES + 9 + 3 * k, direction(s, w, g[1], vector(gp, 12 + 3 * k)))
+        put(room, AXES + 3 * k, direction(model, data, g[0], vector(gp, 3 * k)))
+        put(room, AXES + 9 + 3 * k, direction(model, data, g[1], vector(gp, 12 + 3 * k)))
     one, two = at(room, AXES), at(room, AXES + 9)
-    start, end = station(s, w, g[0], vector(gp, 9)), station(s, w, g[1], vector(gp, 21))
+    start, end = station(model, data, g[0], vector(gp, 9)), station(model, data, g[1], vector(gp, 21))
     put(room, 6, start)
     put(room, 9, end)
     x, y, z = turned(one, vector(two, 0)), turned(one, vector(two, 3)), turned(one, vector(two, 6))
     put(d, 0, xyz_angles(x[0], y[0], z[0], x[1], y[1], z[1], z[2]))
     put(d, 3, turned(one, minus(end, start)))
     # The moving frame is carried around by the other.
-    put(rates, 3, turned(one, minus(velocity(s, w, g[1], end), velocity(s, w, g[0], end))))
-    wx, wy, wz = turned(two, minus(angular_velocity(s, w, g[1]), angular_velocity(s, w, g[0])))
+    put(rates, 3, turned(one, minus(velocity(model, data, g[1], end), velocity(model, data, g[0], end))))
+    wx, wy, wz = turned(two, minus(angular_velocity(model, data, g[1]), angular_velocity(model, data, g[0])))
     put(rates, 0, xyz_rates(d[1], d[2], wx, wy, wz))
 
 
-def load_frames(s: Ints, w: Floats, g: Ints, room: Floats) -> None:
+def load_frames(model: Ints, data: Floats, g: Ints, room: Floats) -> None:
     """Apply the loads to both bodies; the record then has force and moment on the second frame."""
     loads, d = at(room, LOADS), at(room, DEVIATIONS)
     force = turned_back(at(room, AXES), vector(loads, 3))
     moment = turned_back(at(room, AXES + 9), xyz_moment(d[1], d[2], loads[0], loads[1], loads[2]))
     put(room, 0, force)
     put(room, 3, moment)
-    apply_force(s, w, g[1], vector(room, 9), force)
-    apply_force(s, w, g[0], vector(room, 9), times(-1.0, force))
-    apply_torque(s, w, g[1], moment)
-    apply_torque(s, w, g[0], times(-1.0, moment))
+    apply_force(model, data, g[1], vector(room, 9), force)
+    apply_force(model, data, g[0], vector(room, 9), times(-1.0, force))
+    apply_torque(model, data, g[1], moment)
+    apply_torque(model, data, g[0], times(-1.0, moment))
 
 
 def damped(rate: float, damping: float) -> float:
@@ -84,10 +84,10 @@ class BetweenFrames(Geometry):
 
     inputs = ("deviations", "rates", "loads")
     before = (
-        "deviate(s, w, g, gp, room)",
+        "deviate(model, data, g, gp, room)",
         f"deviations, rates, loads = at(room, {DEVIATIONS}), at(room, {RATES}), at(room, {LOADS})",
     )
-    after = ("load_frames(s, w, g, room)",)
+    after = ("load_frames(model, data, g, room)",)
     calls = (deviate, load_frames)
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[Frame, ...]:

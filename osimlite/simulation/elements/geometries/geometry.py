@@ -13,8 +13,8 @@ from osimlite.simulation.elements.items import Item
 class Geometry:
     """Where a force acts.
 
-    In the code of a kernel, `g` are the geometry's integers, `gp` its numbers and `room` its part of the record; `s`,
-    `x`, `w`, `y`, `f` are as every kernel has them.
+    In the code of a kernel, `g` are the geometry's integers, `gp` its numbers and `room` its part of the record;
+    `model`, `reals`, `data`, `y`, `f` are as every kernel has them.
     """
 
     inputs: ClassVar[tuple[str, ...]] = ()  # what it computes for a law, in the code before the law is called

@@ -14,27 +14,27 @@ from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 
-def line(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float]:
+def line(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float]:
     """Length and rate; its direction and its ends go into the record."""
-    one, two = station(s, w, g[0], vector(gp, 0)), station(s, w, g[1], vector(gp, 3))
+    one, two = station(model, data, g[0], vector(gp, 0)), station(model, data, g[1], vector(gp, 3))
     between = minus(two, one)
     length = norm(between)
     ahead = times(1.0 / length if length > 0.0 else 0.0, between)
     put(room, 0, ahead)
     put(room, 3, one)
     put(room, 6, two)
-    return length, dot(minus(velocity(s, w, g[1], two), velocity(s, w, g[0], one)), ahead)
+    return length, dot(minus(velocity(model, data, g[1], two), velocity(model, data, g[0], one)), ahead)
 
 
-def pull_ends(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats, tension: float) -> None:
+def pull_ends(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats, tension: float) -> None:
     """Pull at both ends; then the record has force and recorded point of either."""
     pull, back = times(tension, vector(room, 0)), times(-tension, vector(room, 0))
-    apply_force(s, w, g[0], vector(room, 3), pull)
-    apply_force(s, w, g[1], vector(room, 6), back)
+    apply_force(model, data, g[0], vector(room, 3), pull)
+    apply_force(model, data, g[1], vector(room, 6), back)
     put(room, 0, pull)
-    put(room, 3, station(s, w, g[0], vector(gp, 6)))
+    put(room, 3, station(model, data, g[0], vector(gp, 6)))
     put(room, 6, back)
-    put(room, 9, station(s, w, g[1], vector(gp, 9)))
+    put(room, 9, station(model, data, g[1], vector(gp, 9)))
 
 
 class Ends(NamedTuple):
@@ -58,8 +58,8 @@ class BetweenPoints(Geometry):
     as_written: bool = False  # whether the record names the frames as the force does, and not by their names
 
     inputs = ("length", "rate")
-    before = ("length, rate = line(s, w, g, gp, room)",)
-    after = ("pull_ends(s, w, g, gp, room, tension)",)
+    before = ("length, rate = line(model, data, g, gp, room)",)
+    after = ("pull_ends(model, data, g, gp, room, tension)",)
     calls = (line, pull_ends)
 
     def read(self, builder: ElementBuilder, force: Any) -> Ends:

@@ -19,7 +19,7 @@ FRAME = 12
 """Numbers of a frame: rotation by columns and origin in its link."""
 
 
-def apply_load(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats, t: float) -> None:
+def apply_load(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats, t: float) -> None:
     """Apply force and torque; the record has the force, the point in the first frame, and the torque.
 
     The integers are the links of three frames (where the force acts, along whose axes force and torque are, in which
@@ -28,19 +28,19 @@ def apply_load(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats, t: float) 
     find_load(g, gp, room, t)
     link = g[0]
     if g[3] > 0:
-        turn_vector(s, w, g[1], at(gp, FRAME), room)
-        point = station(s, w, link, vector(gp, 9))
+        turn_vector(model, data, g[1], at(gp, FRAME), room)
+        point = station(model, data, link, vector(gp, 9))
         if g[4] > 0:
             origin = point
-            turn_vector(s, w, g[2], at(gp, 2 * FRAME), at(room, 3))
-            point = plus(station(s, w, g[2], vector(gp, 33)), vector(room, 3))
+            turn_vector(model, data, g[2], at(gp, 2 * FRAME), at(room, 3))
+            point = plus(station(model, data, g[2], vector(gp, 33)), vector(room, 3))
             away = minus(point, origin)
             for k in range(3):
-                room[3 + k] = dot(direction(s, w, link, vector(gp, 3 * k)), away)
-        apply_force(s, w, link, point, vector(room, 0))
+                room[3 + k] = dot(direction(model, data, link, vector(gp, 3 * k)), away)
+        apply_force(model, data, link, point, vector(room, 0))
     if g[5] > 0:
-        turn_vector(s, w, g[1], at(gp, FRAME), at(room, 6))
-        apply_torque(s, w, link, vector(room, 6))
+        turn_vector(model, data, g[1], at(gp, FRAME), at(room, 6))
+        apply_torque(model, data, link, vector(room, 6))
 
 
 def find_load(g: Ints, gp: Floats, room: Floats, t: float) -> None:
@@ -50,9 +50,9 @@ def find_load(g: Ints, gp: Floats, room: Floats, t: float) -> None:
             room[k], _, _ = value_at(at(gp, g[6 + k]), t)
 
 
-def turn_vector(s: Ints, w: Floats, link: int, axes: Floats, turning: Floats) -> None:
+def turn_vector(model: Ints, data: Floats, link: int, axes: Floats, turning: Floats) -> None:
     """From along the axes of a frame, which are given by columns in its link, to along those of ground."""
-    put(turning, 0, direction(s, w, link, turned_back(axes, vector(turning, 0))))
+    put(turning, 0, direction(model, data, link, turned_back(axes, vector(turning, 0))))
 
 
 class Load(NamedTuple):
@@ -75,7 +75,7 @@ class Load(NamedTuple):
 class GivenLoad(Geometry):
     """A load that is given; there is no law."""
 
-    after = ("apply_load(s, w, g, gp, room, w[WORK.TIME])",)
+    after = ("apply_load(model, data, g, gp, room, data[WORK.TIME])",)
     calls = (apply_load,)
 
     def pack(self, place: Load, places: Places) -> tuple[Sequence[int], Sequence[float]]:

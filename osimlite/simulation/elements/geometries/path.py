@@ -27,12 +27,12 @@ class AlongPath(Geometry):
     speed = "rate"
     along = "tension", -1
     before = (
-        "length, rate = path_length(s, x, w, y, f, item - g[0])",
+        "length, rate = path_length(model, reals, data, y, f, item - g[0])",
         "if length != length:",
         "    return OUTCOME.UNSOLVED",
     )
-    again = ("length, rate = known_length(s, w, item - g[0])",)
-    after = ("pull_path(s, x, w, y, f, item - g[0], tension)",)
+    again = ("length, rate = known_length(model, data, item - g[0])",)
+    after = ("pull_path(model, reals, data, y, f, item - g[0], tension)",)
     calls = (path_length, known_length, pull_path)
 
     def read(self, builder: ElementBuilder, force: Any) -> Path:

@@ -20,26 +20,26 @@ from osimlite.simulation.elements.geometries.geometry import Geometry
 NO_MATERIAL = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def sphere_depth(s: Ints, w: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, Vector]:
+def sphere_depth(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats) -> tuple[float, float, Vector]:
     """Depth, radius and normal; the point of contact goes into the record."""
-    o, n = station(s, w, g[0], vector(gp, 0)), direction(s, w, g[0], vector(gp, 3))
-    center = station(s, w, g[1], vector(gp, 6))
+    o, n = station(model, data, g[0], vector(gp, 0)), direction(model, data, g[0], vector(gp, 3))
+    center = station(model, data, g[1], vector(gp, 6))
     d = gp[9] - dot(minus(center, o), n)
     # Half the depth is either surface's.
     put(room, 3, along(center, 0.5 * d - gp[9], n))
     return d, gp[9], n
 
 
-def approach(s: Ints, w: Floats, g: Ints, room: Floats) -> Vector:
+def approach(model: Ints, data: Floats, g: Ints, room: Floats) -> Vector:
     """Velocity of the half space relative to the sphere, at the point of contact."""
-    return minus(velocity(s, w, g[0], vector(room, 3)), velocity(s, w, g[1], vector(room, 3)))
+    return minus(velocity(model, data, g[0], vector(room, 3)), velocity(model, data, g[1], vector(room, 3)))
 
 
-def push_both(s: Ints, w: Floats, g: Ints, room: Floats, force: Vector) -> None:
+def push_both(model: Ints, data: Floats, g: Ints, room: Floats, force: Vector) -> None:
     """Push the sphere and, the other way, the half space at the point of contact; the force goes into the record."""
     put(room, 0, force)
-    apply_force(s, w, g[1], vector(room, 3), force)
-    apply_force(s, w, g[0], vector(room, 3), times(-1.0, force))
+    apply_force(model, data, g[1], vector(room, 3), force)
+    apply_force(model, data, g[0], vector(room, 3), times(-1.0, force))
 
 
 class SphereOnPlane(Geometry):
@@ -49,8 +49,8 @@ class SphereOnPlane(Geometry):
     """
 
     inputs = ("d", "radius", "n", "v")
-    before = ("d, radius, n = sphere_depth(s, w, g, gp, room)", "v = approach(s, w, g, room)")
-    after = ("push_both(s, w, g, room, (fx, fy, fz))",)
+    before = ("d, radius, n = sphere_depth(model, data, g, gp, room)", "v = approach(model, data, g, room)")
+    after = ("push_both(model, data, g, room, (fx, fy, fz))",)
     calls = (sphere_depth, approach, push_both)
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[ContactSurface, ContactSurface]:

@@ -121,10 +121,10 @@ class BulletEngine(KernelEngine):
         self.coordinates = [joint.coordinates[0] for joint in body.joints]
 
     # ---------------------------------------------------------------------------------------- accelerations
-    def _supply_matrix(self, s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> None:
+    def _supply_matrix(self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int) -> None:
         """Mass matrix and bias; see :class:`osimlite.simulation.pack_chain.Chain`."""
         robot, client, first = self._body.id, self._body.client, self._forces
-        values, rates, accelerations = w[self._moves : first].reshape(3, -1).tolist()
+        values, rates, accelerations = data[self._moves : first].reshape(3, -1).tolist()
         try:
             forces = bullet.calculateInverseDynamics(robot, values, rates, accelerations, 0, client)
         except SystemError:
@@ -132,21 +132,21 @@ class BulletEngine(KernelEngine):
                 f"Bullet refuses the inertias of '{self.mechanism.name}', which are none after its own rounding; look "
                 "for masses and mass centers beyond belief, or take --engine compiled"
             ) from None
-        self._pack_forces(w, 8 * first, *forces)
+        self._pack_forces(data, 8 * first, *forces)
         # numpy takes twice as long to read tuples.
         matrix = chain.from_iterable(bullet.calculateMassMatrix(robot, values, 0, client))
-        self._pack_matrix(w, 8 * (first + len(forces)), *matrix)
+        self._pack_matrix(data, 8 * (first + len(forces)), *matrix)
 
-    def _supply_by_step(self, s: Ints, x: Floats, w: Floats, y: Floats, f: Floats, unused: int) -> None:
+    def _supply_by_step(self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int) -> None:
         """Accelerations a: a mass matrix of one, and b - a as what has to be overcome."""
         first, size = self._forces, len(self.order)
-        values, rates, biases = w[self._moves : first].reshape(3, -1)
+        values, rates, biases = data[self._moves : first].reshape(3, -1)
         count, applied = len(values), f[size : 2 * size]
         forces = self.joint_forces(y.tolist(), applied)
         result = self._body.accelerations_by_step(values.tolist(), rates.tolist(), forces)
         applied[:] = 0.0
-        w[first : first + count] = biases - result
-        w[first + count : first + count + count * count] = np.eye(count).ravel()
+        data[first : first + count] = biases - result
+        data[first + count : first + count + count * count] = np.eye(count).ravel()
 
     def joint_forces(self, y: Sequence[float], forces: Array) -> list[float]:
         """Forces on joints that are coordinates each, which do what forces conjugate to the generalized speeds do."""
