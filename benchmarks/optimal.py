@@ -40,6 +40,8 @@ before = time.process_time()
 def more(study):
     if hessian:
         study.solver.optim_hessian_approximation = hessian
+    elif os.path.exists("inverse.xml"):
+        study.solver.optim_hessian_approximation = "limited-memory"
     if os.path.exists("more.omoco"):
         added = osimlite.read_document("more.omoco")
         study.problem.phases.goals += [goal.copy_deep() for goal in added.problem.phases.goals]

@@ -95,10 +95,12 @@ class Asked:
                 for word in value if isinstance(value, tuple) else (value,):
                     if spec.name in part.model_fields_set and (fault := _fault(spec, word)):
                         raise self.wrong(part, f"{spec.tag} is {word!r}{fault}")
-            for name in ("bounds", "initial_bounds", "final_bounds"):
-                ends: Any = getattr(part, name, ())
-                if len(ends) == 2 and isinstance(ends[0], float) and ends[0] > ends[1]:
-                    raise self.wrong(part, f"{name} from {ends[0]:g} to {ends[1]:g} leave no value")
+                if (
+                    spec.name in ("bounds", "initial_bounds", "final_bounds")
+                    and len(value) == 2
+                    and value[0] > value[1]
+                ):
+                    raise self.wrong(part, f"{spec.name} from {value[0]:g} to {value[1]:g} leave no value")
 
     def pattern(self, part: Object, text: str) -> Callable[[str], Any]:
         """What tells whether a name matches a pattern.

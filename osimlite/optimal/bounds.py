@@ -7,6 +7,9 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.schema.actuators import ActivationCoordinateActuator, ScalarActuator
 from osimlite.schema.base import Component
@@ -118,8 +121,8 @@ def scaling(low: float, high: float) -> tuple[float, float]:
     return (width, -0.5 * (high + low)) if width else (1.0, high)
 
 
-def middle(low: float, high: float) -> float:
+def middle(low: Array, high: Array) -> Array:
     """Where a search begins: between the bounds, at the only one, or at zero."""
-    if math.isinf(low):
-        return 0.0 if math.isinf(high) else high
-    return low if math.isinf(high) else 0.5 * (low + high)
+    has_low, has_high = np.isfinite(low), np.isfinite(high)
+    ends = np.where(has_low, low, 0.0), np.where(has_high, high, 0.0)
+    return (ends[0] + ends[1]) * np.where(has_low & has_high, 0.5, 1.0)

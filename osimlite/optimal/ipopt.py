@@ -17,7 +17,7 @@ from osimlite.backends.symbols import casadi
 from osimlite.errors import SimulationError
 from osimlite.multibody.spatial import Array
 from osimlite.optimal.hessian import Hessian
-from osimlite.optimal.program import Program
+from osimlite.optimal.program import Program, once
 from osimlite.records import dataclass
 
 MANY = 1500
@@ -29,7 +29,7 @@ NEAR = 1e-4
 
 
 THREADS = "OPENBLAS_NUM_THREADS"
-NEARLY = {"mu_strategy": "monotone", "mu_init": 1e-7, "bound_push": 1e-8, "bound_frac": 1e-8}
+NEARLY = {"mu_init": 1e-7, "bound_push": 1e-8, "bound_frac": 1e-8}
 """Of a search that starts near its end: what its barrier costs is no more than the barrier times the bounds."""
 
 
@@ -124,7 +124,6 @@ def solve(
         tell: is told of each iteration.
         near: whether the guess is nearly a solution, so that it is not moved away from its bounds.
     """
-    settings = program.problem.solver
     search = _Search(program, tell)
     options = {
         "ipopt": _options(program) | (NEARLY if near else {}) | {"print_level": 0, "sb": "yes"},
@@ -133,11 +132,11 @@ def solve(
         "no_nlp_grad": True,
         "calc_lam_p": False,
         "calc_lam_x": False,
-        "iteration_callback": search,
+        "iteration_callback": search.told,
         "grad_f": search.gradient,
         "jac_g": search.jacobian,
     }
-    if settings.optim_hessian_approximation == "exact":
+    if _is_exact(program):
         options["hess_lag"] = _curved(program, search)
     before = time.perf_counter()
     _load()
@@ -172,10 +171,16 @@ def _load() -> None:
         del os.environ[THREADS]
 
 
+def _is_exact(program: Program) -> bool:
+    """Where nothing is made small, all multipliers vanish in the end, and second derivatives lead astray until then."""
+    return program.problem.solver.optim_hessian_approximation == "exact" and bool(program.costs)
+
+
 def _options(program: Program) -> dict[str, Any]:
     """As Moco sets them."""
     settings, options = program.problem.solver, dict[str, Any]()
-    options["hessian_approximation"] = settings.optim_hessian_approximation
+    is_exact = _is_exact(program)
+    options["hessian_approximation"] = "exact" if is_exact else "limited-memory"
     # The same steps; what the update adds is a part of the one matrix, in the place of a dozen of solutions for each.
     options["limited_memory_aug_solver"] = "extended"
     if len(program.layout.lower) > MANY:
@@ -183,14 +188,9 @@ def _options(program: Program) -> dict[str, Any]:
         options["mumps_pivot_order"] = 5
     if settings.optim_max_iterations != -1:
         options["max_iter"] = settings.optim_max_iterations
-    is_exact = settings.optim_hessian_approximation == "exact"
-    if is_exact:
-        # The barrier is what suits each step. Where nothing is made small it alone says where to go, and falling by a
-        # plan of its own it took ten times as many; near one bound of many steps are short.
-        options |= {"mu_strategy": "adaptive", "quality_function_centrality": "log"}
     if (tolerance := settings.optim_convergence_tolerance) != -1.0:
         both = ("", "dual_inf_", "compl_inf_")
-        # Newton's last steps are so quick that they end where the barrier still costs up to 1e-2 of the objective.
+        # Newton's last steps are so few that they end where the barrier still costs up to 1e-2 of the objective.
         wanted = min(tolerance, max(CLOSER * tolerance, LEAST)) if is_exact else tolerance
         options |= {f"{each}tol": wanted for each in both} | {f"acceptable_{each}tol": tolerance for each in both}
     if (tolerance := settings.optim_constraint_tolerance) != -1.0:
@@ -248,29 +248,31 @@ def _column(size: int) -> Any:
     return casadi.Sparsity.dense(size, 1)
 
 
-class _Search(casadi.Callback):  # type: ignore[misc]
+class _Search:
     """The functions that Ipopt asks, and what it tells after each iteration."""
 
     def __init__(self, program: Program, tell: Callable[[Progress], None] | None) -> None:
-        casadi.Callback.__init__(self)
         self.program, self.tell, self.stops, self.count = program, tell, False, 0
         self.best: Array | None = None
         self._best = (np.inf, np.inf)
-        self._at: Array | None = None
-        self._slopes: Any = None
         self.scale, self.shift = program.layout.scaling
         columns = np.array(program.jacobian_sparsity.get_triplet()[1], dtype=int)
         self._of_columns = self.scale[columns]
         width, rows = len(program.layout.lower), len(program.labels)
         given = {"x": _column(width), "p": casadi.Sparsity(0, 0)}
-        self._sizes = {"f": 1, "x": width, "lam_x": width, "g": rows, "lam_g": rows, "lam_p": 0}
+        sizes = {"f": 1, "x": width, "lam_x": width, "g": rows, "lam_g": rows}
         scalar, across = casadi.Sparsity.scalar(), casadi.Sparsity.dense(width, 1)
+        # Ipopt asks for what belongs to one x in parts.
+        self._values_at = once(lambda x: program.values(self.real(x)))
+        self._slopes_at = once(lambda x: program.slopes(self.real(x)))
         self.program_itself = _Function("nlp", given, {"f": scalar, "g": _column(rows)}, self._values)
         self.gradient = _Function("nlp_grad_f", given, {"f": scalar, "grad_f_x": across}, self._gradient)
         self.jacobian = _Function(
             "nlp_jac_g", given, {"g": _column(rows), "jac_g_x": program.jacobian_sparsity}, self._jacobian
         )
-        self.construct("told", {})
+        found = [casadi.nlpsol_out(place) for place in range(casadi.nlpsol_n_out())]
+        outputs = {name: _column(sizes.get(name, 0)) for name in found}
+        self.told = _Function("told", outputs, {"stops": scalar}, self._told)
 
     def real(self, x: Array) -> Array:
         """The variables, of those that Ipopt has."""
@@ -281,49 +283,27 @@ class _Search(casadi.Callback):  # type: ignore[misc]
         return (w - self.shift) / self.scale
 
     def _values(self, x: Array, *_: Array) -> tuple[Any, ...]:
-        costs, rows = self.program.values(self.real(x))
+        costs, rows = self._values_at(x)
         return costs.sum(), rows
 
-    def _both(self, x: Array) -> tuple[Array, Array]:
-        if self._at is None or not np.array_equal(self._at, x):
-            self._at, self._slopes = x.copy(), self.program.slopes(self.real(x))
-        return self._slopes
-
     def _gradient(self, x: Array, *_: Array) -> tuple[Any, ...]:
-        return 0.0, self._both(x)[0] * self.scale
+        return 0.0, self._slopes_at(x)[0] * self.scale
 
     def _jacobian(self, x: Array, *_: Array) -> tuple[Any, ...]:
-        return np.zeros(len(self.program.labels)), self._both(x)[1] * self._of_columns
+        return 0.0, self._slopes_at(x)[1] * self._of_columns
 
     # ---------------------------------------------------------------------------------------- after an iteration
-    def get_n_in(self) -> int:
-        return casadi.nlpsol_n_out()
-
-    def get_n_out(self) -> int:
-        return 1
-
-    def get_name_in(self, place: int) -> str:
-        return casadi.nlpsol_out(place)
-
-    def get_name_out(self, place: int) -> str:
-        return "stops"
-
-    def get_sparsity_in(self, place: int) -> Any:
-        return _column(self._sizes.get(casadi.nlpsol_out(place), 0))
-
-    def eval(self, given: Any) -> Any:
-        names = {casadi.nlpsol_out(place): place for place in range(len(given))}
-        w, rows = self.real(np.array(given[names["x"]]).ravel()), np.array(given[names["g"]]).ravel()
-        objective = float(given[names["f"]])
-        found = violations(self.program, w, rows, most=1)
+    def _told(self, x: Array, f: Array, rows: Array, *_: Array) -> tuple[Any, ...]:
+        objective = float(f[0])
+        found = violations(self.program, self.real(x), rows, most=1)
         size = found[0].size if found else 0.0
         rank = (size, np.inf) if size > NEAR else (0.0, objective)
         if rank < self._best:
-            self.best, self._best = w, rank
+            self.best, self._best = self.real(x), rank
         if self.tell is not None:
             self.tell(Progress(self.count, objective, found[0] if found else None))
         self.count += 1
-        return [1.0 if self.stops else 0.0]
+        return (1.0 if self.stops else 0.0,)
 
     @contextmanager
     def interruptible(self) -> Iterator[None]:

@@ -68,23 +68,23 @@ class Layout:
         lower, upper = ([each[k] for each in ranges] for k in range(2))
         self.places: list[Any] = []
         self.places_of = {kind: np.full((len(grid.places), len(self.names[kind])), -1) for kind in KINDS}
-        lows, highs, size, end = [*lower], [*upper], self.shared, len(grid.places) - 1
+        size, end = self.shared, len(grid.places) - 1
+        lows, highs = [np.array(lower)], [np.array(upper)]
+        limits = {kind: np.array([[b.within, b.first, b.last] for b in own]) for kind, own in self.bounds.items()}
         for point in range(len(grid.places)):
             first = size
-            for kind in KINDS:
-                if not self.has(kind, point):
-                    continue
-                for number, bounds in enumerate(self.bounds[kind]):
-                    low, high = bounds.first if point == 0 else bounds.last if point == end else bounds.within
-                    lows.append(low)
-                    highs.append(high)
-                    self.places_of[kind][point, number] = size
-                    size += 1
+            for kind, own in limits.items():
+                if len(own) and self.has(kind, point):
+                    ends = own[:, 1 if point == 0 else 2 if point == end else 0]
+                    lows.append(ends[:, 0])
+                    highs.append(ends[:, 1])
+                    self.places_of[kind][point] = np.arange(size, size + len(own))
+                    size += len(own)
             self.places.append(np.arange(first, size))
-        self.lower, self.upper = np.array(lows, float), np.array(highs, float)
+        self.lower, self.upper = np.concatenate(lows), np.concatenate(highs)
         for place in np.flatnonzero(~(self.lower <= self.upper))[:1]:
-            ends = f"from {self.lower[place]:g} to {self.upper[place]:g}"
-            message = f"all bounds of '{self.name_at(place)}' together leave no value ({ends})"
+            span = f"from {self.lower[place]:g} to {self.upper[place]:g}"
+            message = f"all bounds of '{self.name_at(place)}' together leave no value ({span})"
             raise problem.wrong(problem.phase, message)
 
     def has(self, kind: str, point: int) -> bool:
@@ -111,7 +111,7 @@ class Layout:
 
     def guess(self) -> Array:
         """The middle between the bounds of each, as Moco begins."""
-        return np.array([middle(low, high) for low, high in zip(self.lower, self.upper, strict=True)])
+        return middle(self.lower, self.upper)
 
     def taken(self, trajectory: Any) -> Array:
         """A guess from a trajectory, by splines between its times; what it has not is in the middle of its bounds."""

@@ -9,6 +9,7 @@ function, E(s, z_0, z_n, integrals).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -48,6 +49,19 @@ class Buffered:
             own[:] = array.reshape(-1)
         self._run()
         return [array.copy() for array in self._results]
+
+
+def once(law: Callable[[Array], Any]) -> Callable[[Array], Any]:
+    """The law, that keeps its result for the array that it was last asked for."""
+    kept: Any = None
+
+    def result(x: Array) -> Any:
+        nonlocal kept
+        if kept is None or not np.array_equal(kept[0], x):
+            kept = x.copy(), law(x)
+        return kept[1]
+
+    return result
 
 
 class PointFormula:
@@ -166,7 +180,7 @@ class Program:
     def __init__(self, problem: Problem) -> None:
         self.problem, self.layout = problem, Layout(problem)
         self._found: dict[bytes, Array] = {}
-        self._last: tuple[Array, Array] | None = None
+        self._rows_of = once(lambda w: self._a @ w + self._b @ self._all("value", w))
         self.labels: list[str] = []
         self.times: Array = np.zeros(0)
         self.lower: Array = np.zeros(0)
@@ -411,12 +425,6 @@ class Program:
 
     def _all(self, name: str, w: Array) -> Array:
         return np.concatenate([getattr(sort, name)(*self._given(sort, w))[0].ravel() for sort in self.sorts])
-
-    def _rows_of(self, w: Array) -> Array:
-        """G and the integrals; Ipopt asks for all that belongs to one w, one after the other."""
-        if self._last is None or not np.array_equal(self._last[0], w):
-            self._last = w.copy(), self._a @ w + self._b @ self._all("value", w)
-        return self._last[1]
 
     def _end_given(self, w: Array, totals: Array) -> list[Array]:
         known = self._known(w[:2])

@@ -13,6 +13,7 @@ import osimlite
 from osimlite.moco import MocoTrajectory, evaluated, problem_of, solve
 from osimlite.optimal.program import Program
 from osimlite.simulation.files.storage import read_sto, write_sto
+from tests.optimal import small
 from tests.optimal.studies import moco_found, moco_said, study, study_file
 
 STUDIES = "sliding-100", "pendulum-50", "squat-25"
@@ -53,7 +54,7 @@ def test_ours_costs_no_more(name, solved, tmp_path):
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_exact_hessian_finds_it_too(name, tmp_path):
-    found = solve(study(tmp_path, name, optim_hessian_approximation="exact", optim_convergence_tolerance=1e-6))
+    found = solve(study(tmp_path, name, optim_hessian_approximation="exact"))
     assert found.success
     assert found.objective <= moco_said(name)["objective"] * (1.0 + 1e-4)
 
@@ -64,10 +65,25 @@ def test_scaled_variables_find_it_too(name, hessian, tmp_path):
     scaled = {"scale_variables_using_bounds": True, "optim_hessian_approximation": hessian}
     found = solve(study(tmp_path, name, **scaled))
     assert found.success
-    # Of the squat the exact Hessian finds another optimum, scaled or not.
-    assert found.objective <= moco_said(name)["objective"] * (1.0 + 5e-4)
+    # At the tolerance of the squat limited memory ends up to 4e-4 above the optimum.
+    assert found.objective <= moco_said(name)["objective"] * (1.0 + (1e-4 if hessian == "exact" else 5e-4))
     if name == "squat-25":
         assert found.iterations < 40
+
+
+def test_nothing_to_make_small():
+    """There second derivatives are those of constraints whose multipliers vanish: they are left out."""
+
+    def found(hessian):
+        given = small.study_of(small.coupled(small.links(), "q1"), optim_hessian_approximation=hessian)
+        given.problem.phases.state_infos = [
+            osimlite.MocoVariableInfo(name="/jointset/j0/q0/value", bounds=(-2.0, 2.0), initial_bounds=(-0.5,))
+        ]
+        return solve(given)
+
+    exact, other = found("exact"), found("limited-memory")
+    assert exact.success and exact.objective == 0.0
+    assert exact.iterations == other.iterations
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

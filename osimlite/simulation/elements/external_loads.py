@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from osimlite.document.kept import while_unchanged
 from osimlite.document.part import read_object
 from osimlite.errors import DocumentError, ModelError, SettingError
 from osimlite.multibody.functions import Constant, Function, PiecewiseLinear
@@ -123,7 +124,11 @@ def loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> StoTabl
     if name in ("", "Unassigned"):
         raise DocumentError("it names no data file; give it a <datafile>", file=file)
     path = beside(folder, name)
-    return read_c3d_forces(path) if path.suffix.lower() == ENDING else read_sto(path)
+    return read_c3d_forces(path) if path.suffix.lower() == ENDING else _known(str(path)) or read_sto(path)
+
+
+_known = while_unchanged(4)(read_sto)
+"""Each of the loads asks for the table of all."""
 
 
 def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: str | None) -> Load:
