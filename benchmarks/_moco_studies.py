@@ -164,7 +164,7 @@ def walk3d(folder: Path, core: Path) -> None:
     names = "subject_walk_scaled.osim", paths, "coordinates.sto", "grf_walk.xml", "grf_walk.mot"
     sources(core, WALKING_3D, names, folder)
     model = osimlite.modify(
-        osimlite.read_document(folder / names[0]),
+        osimlite.read(folder / names[0]),
         osimlite.ModOpReplaceJointsWithWelds(joint_paths=("mtp_r", "mtp_l")),
         osimlite.ModOpAddExternalLoads(filepath=str(folder / "grf_walk.xml")),
     )
@@ -203,7 +203,8 @@ def walk3d(folder: Path, core: Path) -> None:
     functions = osimlite.casadi(model, folder=folder)
     repeats = osimlite.MocoPeriodicityGoal(name="periodicity")
     for pairs, known in ((repeats.state_pairs, functions.states), (repeats.control_pairs, functions.controls)):
-        pairs += [osimlite.MocoPeriodicityGoalPair(initial_variable=name) for name in known if "_tx/value" not in name]
+        repeated = (name for name in known if "_tx/value" not in name)
+        pairs += [osimlite.MocoPeriodicityGoalPair(initial_variable=name, final_variable=name) for name in repeated]
     more = osimlite.MocoProblem(name="problem", phases=osimlite.MocoPhase(name="phases", goals=[repeats]))
     solver = osimlite.MocoCasADiSolver(
         optim_convergence_tolerance=1e-3, optim_constraint_tolerance=1e-4, optim_max_iterations=1000
