@@ -29,7 +29,7 @@ from osimlite.kernels.pointers import Floats, at
 LANES = 64
 """So many can be asked at once."""
 COEFFICIENTS = STARTS - X
-VALUE, SLOPE, INSIDE, GOES_ON, REST, U, OF_X, ROWS = 0, 1, 2, 3, 4, 5, 6, 6 + COEFFICIENTS
+VALUE, INSIDE, GOES_ON, REST, U, OF_X, ROWS = 0, 1, 2, 3, 4, 5, 5 + COEFFICIENTS
 """Rows of the room, each of LANES numbers: the answer; 0 where the argument is outside of the curve, and the answer
 there at once; whether the search has to go on, how far the argument is from the start of its section, the place on
 that, and its coefficients."""
@@ -41,7 +41,7 @@ def ask(x: Floats, room: Floats, number: int, place: int, z: float) -> None:
     lane = at(room, number)
     end = FIRST if not z >= c[FIRST] else LAST
     if end == FIRST or z > c[LAST]:
-        lane[LANES * VALUE], lane[LANES * SLOPE] = c[end + 1] + c[end + 2] * (z - c[end]), c[end + 2]
+        lane[LANES * VALUE] = c[end + 1] + c[end + 2] * (z - c[end])
         # A search that is at its end.
         lane[LANES * INSIDE] = lane[LANES * REST] = lane[LANES * U] = 0.0
         lane[LANES * OF_X] = 1.0
@@ -82,11 +82,6 @@ def value_of(room: Floats, number: int) -> float:
     return room[LANES * VALUE + number]
 
 
-def slope_of(room: Floats, number: int) -> float:
-    """Its slope."""
-    return room[LANES * SLOPE + number]
-
-
 def answer(room: Any, asked: int, rounds: int) -> None:
     """Answer all that was asked; as a rule a search takes so many rounds, which all go together."""
     for lane in range(asked):
@@ -114,7 +109,6 @@ def step(room: Any, lane: int) -> None:
 
 def tell(room: Any, lane: int) -> None:
     """What a search has come to."""
-    value, slope = value_at(room, LANES * OF_X + lane, LANES, room[LANES * U + lane])
+    value, _ = value_at(room, LANES * OF_X + lane, LANES, room[LANES * U + lane])
     is_inside = room[LANES * INSIDE + lane] > 0.0
     room[LANES * VALUE + lane] = value if is_inside else room[LANES * VALUE + lane]
-    room[LANES * SLOPE + lane] = slope if is_inside else room[LANES * SLOPE + lane]

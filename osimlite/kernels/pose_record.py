@@ -18,7 +18,6 @@ SLIDES = 3
 """The first of the parts of a ball that are slides to the ellipsoid, after its turns."""
 RESOLVED_AT, FREE_AT = 13, 14
 """Places of what each degree of freedom is, and of a list of those that are free."""
-FIT_INTS = 15
 VARIABLE, GIVEN, DEPENDENT = 0, 1, 2
 """What a degree of freedom is: free, held at a value, a function of others."""
 AT_END, IDLE = 3, 4

@@ -24,7 +24,7 @@ def stride(problem: Problem, trajectory: MocoTrajectory) -> MocoTrajectory | Non
     if not pairs:
         return None
     start, end = trajectory.times[[0, -1]]
-    follows = {pair.final_variable or pair.initial_variable: pair for pair in pairs}
+    follows = {pair.final_variable: pair for pair in pairs}
     names = {kind: trajectory.names[kind] for kind in ("states", "controls")}
     columns = {}
     for name in (*names["states"], *names["controls"]):

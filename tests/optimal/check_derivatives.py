@@ -119,7 +119,7 @@ GOALS = {
     "MocoSumSquaredStateGoal": {"divide_by_duration": True, "divide_by_mass": True},
     "MocoExpressionBasedParameterGoal": {"expression": "m^2 + 1/m", "parameters": [PARAMETER], "variables": ("m",)},
     "MocoPeriodicityGoal": {
-        "state_pairs": [PAIR(initial_variable=SWING)],
+        "state_pairs": [PAIR(initial_variable=SWING, final_variable=SWING)],
         "control_pairs": [PAIR(initial_variable="/forceset/motor0", final_variable="/forceset/motor1", negate=True)],
         "mode": "cost",
     },

@@ -16,7 +16,7 @@ def terms(goal: MocoPeriodicityGoal, problem: Problem) -> Terms:
         (goal.control_pairs, problem.controls, "control"),
     ):
         for pair in given:
-            first, last = pair.initial_variable, pair.final_variable or pair.initial_variable
+            first, last = pair.initial_variable, pair.final_variable
             for name in (first, last):
                 problem.expect(pair, name, known, what)
             pairs.append((what, first, last, -1.0 if pair.negate else 1.0))
