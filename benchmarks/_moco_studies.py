@@ -41,6 +41,8 @@ def kept(name: str) -> Callable[[Path, Path], None]:
 
 def sources(core: Path, part: str, names: tuple[str, ...], folder: Path) -> None:
     """Copy files of opensim-core, which is a folder or a git directory."""
+    if not core.is_dir():
+        raise SystemExit(f"there is no folder {core}: name the sources of opensim-core by --core FOLDER")
     for name in names:
         if (core / "objects").is_dir():
             command = ["git", f"--git-dir={core}", "show", f"HEAD:{part}/{name}"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterable
+from collections.abc import Collection, Container, Iterable
 from itertools import chain, count
 
 _COLOUR = r"\x1b\[[0-9;]*m"
@@ -91,6 +91,12 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     """``"; did you mean 'x'?"``, or an empty text if nothing is near."""
     result = nearest(word, known)
     return f"; did you mean '{result}'?" if result else ""
+
+
+def did_you_mean_path(name: str, paths: Collection[str]) -> str:
+    """The same, where the name may be a part of a path: ``/jointset/knee/angle/value`` for ``angle``."""
+    within = next((f"; did you mean '{path}'?" for path in paths if name in path.split("/")), "")
+    return within or did_you_mean(name, paths)
 
 
 def or_known(word: str, known: Iterable[str], *more: str) -> str:

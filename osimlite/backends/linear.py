@@ -14,7 +14,7 @@ from osimlite.errors import SettingError
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.schema.model import Model
-from osimlite.text import did_you_mean
+from osimlite.text import did_you_mean, did_you_mean_path
 
 Given = Mapping[str, float] | Sequence[float] | None
 
@@ -81,10 +81,10 @@ def linearize(
 
     Other errors are those of :func:`osimlite.tangents`.
     """
-    if isinstance(model, Model):
-        model = tangents(model, (), folder)
-    elif not isinstance(model, TangentModel):
+    if isinstance(model, CasadiModel):
         model = model.in_tangents()
+    elif not isinstance(model, TangentModel):
+        model = tangents(model, (), folder)
     x = _filled("state", model.states, model.x, state)
     u = _filled("control", model.controls, model.u, controls)
     xdot, a, b = model.linear(time, x, u)
@@ -113,8 +113,7 @@ def _filled(what: str, names: Sequence[str], default: Array, given: Any) -> Arra
     if isinstance(given, Mapping):
         for name, value in given.items():
             if name not in names:
-                near = next((f"; did you mean '{own}'?" for own in names if name in own.split("/")), "")
-                raise SettingError(f"the model has no {what} '{name}'{near or did_you_mean(name, names)}")
+                raise SettingError(f"the model has no {what} '{name}'{did_you_mean_path(name, names)}")
             result[names.index(name)] = value
     elif given is not None:
         if len(given) != len(names):

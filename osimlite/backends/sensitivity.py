@@ -29,7 +29,7 @@ from osimlite.simulation.start import starting
 from osimlite.simulation.tabular import Tabular
 from osimlite.simulation.trajectory import Trajectory
 from osimlite.sweep.properties import places
-from osimlite.text import did_you_mean
+from osimlite.text import did_you_mean_path
 
 CHOICES = {*PER_RUN, "folder"} - {"fixed_step", "integrator", "controller", "resume"}
 """Options of `simulate` that leave the motion one of the rates as they are, in steps of Merson's method."""
@@ -303,5 +303,5 @@ def _moving(simulation: Simulation, choices: Mapping[str, Any]) -> dict[str, flo
 
 def _place(what: str, names: Sequence[str], name: str) -> int:
     if name not in names:
-        raise SettingError(f"there is no {what} '{name}'{did_you_mean(name, names)}")
+        raise SettingError(f"there is no {what} '{name}'{did_you_mean_path(name, names)}")
     return names.index(name)

@@ -39,9 +39,15 @@ Engine = Annotated[
     str,
     Option(help="What computes the accelerations: 'bullet', 'compiled', or 'auto': the first that is installed."),
 ]
-FirstFrame = Annotated[float, Option("--from", metavar="SECONDS", help="Time of the first frame that counts.")]
-LastFrame = Annotated[float, Option("--until", metavar="SECONDS", help="Time of the last frame that counts.")]
-Mass = Annotated[float, Option("--mass", metavar="KG", help="What the subject weighs.")]
+FirstFrame = Annotated[
+    float, Option("--from", metavar="SECONDS", help="Time of the first frame that counts.", show_default="the first")
+]
+LastFrame = Annotated[
+    float, Option("--until", metavar="SECONDS", help="Time of the last frame that counts.", show_default="the last")
+]
+Mass = Annotated[
+    float, Option("--mass", metavar="KG", help="What the subject weighs.", show_default="what the model does")
+]
 Weights = Annotated[
     list[str] | None,
     Option("--weight", metavar="NAME=NUMBER", help="How much a marker or sensor counts; 1 if left out, 0 for none."),

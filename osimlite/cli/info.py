@@ -79,7 +79,7 @@ def info(
         ("probes", str(len(model.probe_set.objects))),
         ("contact surfaces", str(len(model.contact_geometry_set.objects))),
         ("constraints", str(len(model.constraint_set.objects))),
-        ("components in all", str(len(components))),
+        ("components", f"{len(components)} in the file, {len(tree.components)} as OpenSim counts"),
         ("notes on reading", str(len(document.notes))),
         ("simulation", answered("simulation", str(file), source.data, simulation)),
     ]).show()  # fmt: skip

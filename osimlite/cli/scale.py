@@ -51,7 +51,6 @@ def scale(
     from osimlite.cli._console import say
     from osimlite.document.printer import write
     from osimlite.document.reader import read
-    from osimlite.fitting.ik_tool import told
     from osimlite.fitting.scale_tool import scale as scaled
 
     measurements = {
@@ -76,7 +75,7 @@ def scale(
     for note in result.measured.notes:
         say(note)
     if result.placed is not None:
-        for line in told(result.placed.pose):
+        for line in result.placed.told():
             say(line)
     path = Path("scaled.osim") if output is None else output
     write(result.model, path)

@@ -44,9 +44,8 @@ def scone(
 ) -> None:
     """Have the human of a scenario walk, or look for the parameters with which it does best.
 
-    Of SCONE's parts are there: ModelOpenSim4, GaitStateController with its reflexes of muscles and coordinates,
-    functions of time, measures of gait, jumps, effort, coordinates and forces of the ground, CMA-ES. All else is
-    refused by its name and line.
+    A controller of your own, and which of SCONE's parts there are: docs/reflexes.md. All else is refused by its name
+    and line.
 
     What comes out can be looked at: osimlite view walk/human.osim walk/states.sto
 

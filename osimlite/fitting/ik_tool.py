@@ -114,12 +114,13 @@ def coordinate_table(name: str, folder: Path) -> StoTable | None:
     return None if name in UNNAMED else read_sto(folder / name)
 
 
-def told(motion: FittedMotion) -> Iterator[str]:
-    """What a user should know of a motion, beside what OpenSim's documentation advises."""
+def told(motion: FittedMotion, advice: tuple[float, float] = ADVICE, of: str = "") -> Iterator[str]:
+    """What a user should know of a motion, beside what OpenSim's documentation advises of (some) markers, m."""
     result = motion.summary
     if "rms_marker_error" in result:
         rms, largest = result["rms_marker_error"], result["largest_marker_error"]
-        advised = "" if rms < ADVICE[0] and largest < ADVICE[1] else "; OpenSim advises less than 2 and 4 cm"
+        most = " and ".join(f"{100.0 * limit:g}" for limit in advice)
+        advised = "" if rms < advice[0] and largest < advice[1] else f"; OpenSim advises less than {most} cm{of}"
         advised += "; check the units of the data" if rms > ABSURD else ""
         yield (
             f"{counted(result['frames'], 'frame')}, {counted(result['markers'], 'marker')}: "

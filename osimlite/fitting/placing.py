@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from osimlite.errors import SettingError
 from osimlite.fitting.fitted_motion import FittedMotion
-from osimlite.fitting.ik_tool import tasks_of
+from osimlite.fitting.ik_tool import tasks_of, told
 from osimlite.fitting.inverse_kinematics import fitted
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.measuring import frames_between
@@ -30,6 +30,10 @@ class Placed:
     pose: FittedMotion  # of the model as the subject stood, with the errors of the markers before they were moved
     removed: tuple[str, ...]  # markers of the model that the data do not have; it has them no more
     moved: dict[str, float]  # by how much each marker was moved in its frame, m
+
+    def told(self) -> Iterator[str]:
+        """What a user should know of the pose; the limits are those of OpenSim's checklist for a static trial."""
+        return told(self.pose, (0.01, 0.02), " of markers on bones")
 
 
 def place_markers(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from osimlite.fitting.ik_tool import told
 from osimlite.fitting.scale_tool import run_scale
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
@@ -21,5 +20,5 @@ def run(job: Job, outcome: Outcome) -> None:
             outcome.tell("left out", note)
     if result.placed is not None:
         outcome.summary |= result.placed.pose.summary
-        for words in told(result.placed.pose):
+        for words in result.placed.told():
             outcome.tell("markers", words)

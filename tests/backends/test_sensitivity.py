@@ -122,8 +122,13 @@ def test_numbers_are_named_and_found():
     assert [*rows] == ["time"] and f"{ANGLE}|/bodyset/rod/mass" in columns and len(columns) == 4
     with pytest.raises(osimlite.OsimliteError, match="no number '/bodyset/rod/mas'; did you mean"):
         found.of(ANGLE, "/bodyset/rod/mas")
-    with pytest.raises(osimlite.OsimliteError, match="no state 'angle'"):
+    with pytest.raises(osimlite.OsimliteError, match=f"no state 'angle'; did you mean '{ANGLE}'"):
         found.of("angle", SPEED)
+
+
+def test_a_path_in_the_place_of_a_model_is_answered_with_how_to_read_it():
+    with pytest.raises(osimlite.OsimliteError, match=r"osimlite\.read\('arm\.osim'\)"):
+        osimlite.linearize("arm.osim")
 
 
 def test_tangents_are_taken_for_many_motions():

@@ -103,6 +103,7 @@ def test_a_gait_model_is_scaled_as_opensim_scales_it(setup: Path) -> None:
     (setup / "pose.mot").write_text(text)
     pose, known = read_sto(setup / "pose.mot"), read_sto(setup / "their_subject01_static_output.mot")
     assert pose.columns == known.columns and pose.rows == pytest.approx(known.rows, abs=0.02)
+    assert next(iter(result.placed.told())).endswith("OpenSim advises less than 1 and 2 cm of markers on bones")
     assert len(result.placed.moved) > 30 and max(result.placed.moved.values()) < 0.2
 
 
