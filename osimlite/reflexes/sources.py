@@ -121,6 +121,8 @@ def _told(*vectors: Array) -> str:
 def _point(what: str, kind: int) -> Feel:
     def feel(felt: Felt, node: Node, number: int, side: str) -> Source:
         offset, direction = node.vector("offset", "0 0 0"), node.vector("direction")
+        if not direction.any():
+            raise node.error("'direction' is 0 0 0, along which nothing is felt")
         link, frame = felt.engine.placements[number]
         numbers = *(frame[:3, :3] @ offset + frame[:3, 3]), *direction
         return Source(f"{_bodies(felt)[number]}.{what}{_told(offset, direction)}", kind, link, 0, numbers)

@@ -27,6 +27,7 @@ def held(model: Any, given: dict[str, Any], values: dict[str, float] | None = No
     ("kind", "changed", "words"),
     [
         ("BodyPointReflex", {"direction": None, "KP": 1}, "'direction' is missing"),
+        ("BodyPointReflex", {"direction": [0, 0, 0], "KP": 1}, "'direction' is 0 0 0"),
         ("BodyPointReflex", {"direction": [1, 0], "KP": 1}, r"'direction' must be three numbers, as \[ 0 0 1 \], not"),
         ("BodyPointReflex", {"KA": 1}, "'KA' of reflexes is not done here"),
         ("BodyPointReflex", {"source": "forarm"}, "the model has no 'forarm'.*did you mean 'forearm'"),
