@@ -169,7 +169,8 @@ class Stepper(ABC):
             if not isfinite(value):
                 raise IntegrationError(
                     f"The derivative of {self._name(index)} is {value} at t = {t:.9g} s; check the masses, inertias "
-                    "and parameters of forces that it depends on, of a muscle also whether it starts in equilibrium.",
+                    "and parameters of forces that it depends on, of a muscle also whether it starts in equilibrium, "
+                    "and whether its control is above 0: near rest, an elastic tendon can be stiff without bound.",
                     t,
                     index,
                 )
