@@ -113,8 +113,7 @@ def starts_in_contact(subject: Subject, found: FindingSink) -> None:
     Puts the model in its default pose and reports balls that start inside a half-space or another ball of their
     contact force, by more than 1 mm and a tenth of the radius. It is a warning if the middle of the ball is inside.
     Only bodies whose place plain arithmetic tells are looked at: those that hang on joints made of plain rotations and
-    translations, or on custom joints with constant, linear or polynomial functions. Meshes and other shapes are left
-    out.
+    translations, or on custom joints without a GCVSpline. Meshes and other shapes are left out.
 
     The contact pushes with full force from the first instant: the model is thrown up, and the integrator takes tiny
     steps. Often the floor or a default value is in the wrong place.
