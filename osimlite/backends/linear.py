@@ -10,7 +10,7 @@ import numpy as np
 
 from osimlite.backends.functions import CasadiModel
 from osimlite.backends.tangents import TangentModel, tangents
-from osimlite.errors import SettingError
+from osimlite.errors import SettingError, SimulationError
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass
 from osimlite.schema.model import Model
@@ -78,6 +78,7 @@ def linearize(
 
     Raises:
         SettingError: there is no such state, control or output.
+        SimulationError: a coordinate moves no mass.
 
     Other errors are those of :func:`osimlite.tangents`.
     """
@@ -88,6 +89,8 @@ def linearize(
     x = _filled("state", model.states, model.x, state)
     u = _filled("control", model.controls, model.u, controls)
     xdot, a, b = model.linear(time, x, u)
+    if len(xdot) and np.isnan(xdot).all():
+        raise SimulationError("the model has no accelerations in this state; a simulation from it says why")
     chosen = _chosen(model.output_names if outputs else {}, outputs)
     y, c, d = model.observed(time, x, u, chosen) if outputs else (np.zeros((0, size)) for size in (1, len(x), len(u)))
     names = tuple(f"{group}:{model.output_names[group][k]}" for group, k in chosen)

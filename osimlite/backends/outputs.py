@@ -6,6 +6,7 @@ As formulas, or as numbers that carry derivatives: `found` runs the kernels on w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import nan
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from osimlite.kernels.layout import INERTIA, INERTIA_AT, LINK, LINK_WORK, MODEL
@@ -20,6 +21,7 @@ from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.sphere_on_plane import SPHERE_ON_PLANE
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.elements.probe import DeclaredProbe
+from osimlite.simulation.engines.carrying import Carrying
 from osimlite.simulation.pack import Packed
 
 if TYPE_CHECKING:
@@ -136,6 +138,9 @@ def _mass_center(mechanism: Mechanism, packed: Packed, found: Found) -> tuple[li
         total = total + mass
         center = [a + mass * b for a, b in zip(center, place, strict=True)]
         rate = [a + mass * b for a, b in zip(rate, moves, strict=True)]
+    # A symbol is neither.
+    if isinstance(total, (float, Carrying)) and float(total) == 0.0:
+        total = nan
     return [a / total for a in center], [a / total for a in rate]
 
 

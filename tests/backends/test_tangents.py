@@ -37,7 +37,7 @@ pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 import osimlite
 from osimlite.backends.tangents import DIRECTIONS
-from osimlite.errors import SettingError, UnsupportedError
+from osimlite.errors import SettingError, SimulationError, UnsupportedError
 from osimlite.forces.carried import is_nothing, settled
 from osimlite.kernels.pointers import Floats, Ints, at
 from osimlite.kernels.table import LAW_MODULES
@@ -265,6 +265,16 @@ def test_parameters():
     assert np.abs(found[:, 0] - wanted).max() < 1e-9 * np.abs(wanted).max()
     # It does not stay.
     assert not made.along(0.0, x, made.u, np.zeros((len(x), 1)))[1].any()
+
+
+def test_what_has_no_mass_has_no_accelerations():
+    model = osimlite.Model(name="massless")
+    body = model.add(osimlite.Body(name="body", mass=0.0))
+    turn = osimlite.Coordinate(name="q")
+    model.add(osimlite.PinJoint(name="joint", coordinates=[turn]).between(model.ground, body))
+    assert "mass_center" in osimlite.tangents(model).output_names
+    with pytest.raises(SimulationError, match="no accelerations in this state"):
+        osimlite.linearize(model, outputs=["mass_center"])
 
 
 def test_what_is_not_there_is_refused():
