@@ -65,6 +65,8 @@ def build(
         hand_over(to_text(model, numbers=style))
         return
     target = output or Path(f"{model.name or 'model'}.osim")
+    if target.suffix == ".omoco":
+        raise OsimliteError(f"{target}: this is the name of a study; name the model's file, {target.stem}.osim")
     write(model, target, numbers=style)
     count = sum(1 for _ in model.components())
     warned = len(report.warnings)

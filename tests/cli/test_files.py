@@ -19,6 +19,8 @@ def test_build_writes_the_walker(tmp_path: Path) -> None:
 def test_build_lists_models_and_takes_parameters(tmp_path: Path) -> None:
     code, out, _ = run("build", "--list")
     assert code == 0 and out.split()[0] == "dynamic-walker" and "()" not in out
+    code, _, error = run("build", "dynamic-walker", "-o", "w.omoco", folder=tmp_path)
+    assert code == 2 and "name the model's file, w.osim" in error and not (tmp_path / "w.omoco").exists()
     code, _, _ = run("build", "dynamic-walker", "-p", "thigh_length=0.42", "-o", "w.osim", folder=tmp_path)
     assert code == 0
     contact = osimlite.read(tmp_path / "w.osim")["/contactgeometryset/RKneeContact"]
