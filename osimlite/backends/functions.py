@@ -119,6 +119,7 @@ class CasadiModel(StatedModel):
         ways = [searched.measured(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)] if searched.size else []
         return np.concatenate((packed.numbers, *_fixed_numbers(mechanism, packed), *ways))
 
+    @cached_property
     def in_tangents(self) -> TangentModel:
         """The same in machine code, with the values that the parameters have here."""
         result = TangentModel(self._model, self.parameters, self._folder)
@@ -251,8 +252,8 @@ class CasadiModel(StatedModel):
         body = next(body for body in bodies if body.mobilizer.joint == path)
         link = placements[bodies.index(body)].link
         if link == (GROUND if body.parent == GROUND else placements[body.parent].link):
-            choices = {"apart": True, "loads_given": bool(self.loads)}
-            return CasadiModel(self._model, self.parameters, self._folder, **choices).joint_load(path, side)
+            own = CasadiModel(self._model, self.parameters, self._folder, apart=True, loads_given=bool(self.loads))
+            return own.joint_load(path, side)
         # The body that the joint carries in the tree gets what is missing there, the other one the opposite.
         sign = 1.0 if (side == "child") != body.mobilizer.reversed else -1.0
         size, xdot = len(self.coordinates), self._engine_order("xdot")

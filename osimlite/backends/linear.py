@@ -83,7 +83,7 @@ def linearize(
     Other errors are those of :func:`osimlite.tangents`.
     """
     if isinstance(model, CasadiModel):
-        model = model.in_tangents()
+        model = model.in_tangents
     elif not isinstance(model, TangentModel):
         model = tangents(model, (), folder)
     x = _filled("state", model.states, model.x, state)

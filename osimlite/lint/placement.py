@@ -22,7 +22,7 @@ from osimlite.lint.skeleton import skeleton
 from osimlite.lint.subject import Subject, once
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame
-from osimlite.schema.functions import GCVSpline, PiecewiseLinearFunction, SimmSpline
+from osimlite.schema.functions import Constant, GCVSpline, PiecewiseLinearFunction, SimmSpline
 from osimlite.schema.joints import EllipsoidJoint, GimbalJoint, Joint
 from osimlite.schema.tree import is_a
 
@@ -145,7 +145,12 @@ def _ways(subject: Subject, rough: bool) -> dict[int, list[_Way]]:
             known = [function for function in functions if function is not None]
             if len(known) == len(axes):
                 result[id(joint)] = [
-                    _Way(place < 3, over(axis.axis, norm(axis.axis) or 1.0), axis.names, function)
+                    _Way(
+                        place < 3,
+                        over(axis.axis, norm(axis.axis) or 1.0),
+                        [] if isinstance(axis.function, Constant) else axis.names,
+                        function,
+                    )
                     for (place, axis), function in zip(axes, known, strict=True)
                 ]
         elif joint.moves is not None and len(words := joint.moves.split()) == len(names) and "r" not in words:
@@ -198,7 +203,7 @@ def turning_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector]]:
     result: dict[str, Vector] = {}
     axes = X, Y, Z
     for way in _ways(subject, False).get(id(joint), []):
-        if not way.turns or len(way.names) != 1 or type(way.function).__name__ == "Constant":
+        if not way.turns or len(way.names) != 1:
             continue
         if way.names[0] not in values or way.axis == ZERO:
             return []

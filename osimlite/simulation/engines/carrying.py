@@ -57,6 +57,7 @@ class Carrying:
     """A number with its derivatives along several directions."""
 
     __array_ufunc__ = None
+    # Two are equal where their values are, whatever they carry, so that none is a key.
     __hash__ = None  # type: ignore[assignment]
     __slots__ = "slopes", "value"
 
