@@ -12,8 +12,8 @@ from typing import Any
 
 from osimlite.backends import symbols, ways
 from osimlite.backends.curves import curve_value_on_symbols, damped_velocity_on_symbols, pieces_on_symbols
-from osimlite.backends.reader import Function, Kernel, name_of, stored
 from osimlite.backends.symbols import COUNTERPARTS, UNSET, NoFormula, Vector
+from osimlite.codegen.reader import Function, Kernel, name_of, stored
 from osimlite.forces.bezier import curve_value
 from osimlite.forces.carried import is_nothing
 from osimlite.forces.millard2012_equilibrium import damped_velocity

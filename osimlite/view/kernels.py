@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.backends.javascript import as_javascript
+from osimlite.codegen.javascript import as_javascript
 from osimlite.kernels.constrained_dynamics import bind
 from osimlite.kernels.dynamics import clear_wrenches, generalized_forces
 from osimlite.kernels.layout import CONSTRAINED, ITEM, LINK_WORK, MODEL

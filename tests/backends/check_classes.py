@@ -12,6 +12,7 @@ import osimlite
 from osimlite.backends.constraints import independent_equations
 from osimlite.backends.symbolic import on_symbols
 from osimlite.backends.traced import Traced
+from osimlite.codegen.sources import collect_functions
 from osimlite.errors import SimulationError, UnsupportedError
 from osimlite.forces import millard2012_equilibrium
 from osimlite.kernels.layout import CONSTRAINED, MODEL, STAGE
@@ -30,7 +31,6 @@ from osimlite.schema.probe_types import ActuatorForceProbe, ActuatorPowerProbe, 
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.kind import Kind, kinds
 from osimlite.simulation.elements.laws import law_function
-from osimlite.simulation.engines.sources import functions_within
 from osimlite.simulation.pack import pack
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
@@ -115,7 +115,7 @@ def test_paths_over_obstacles():
 
 def test_every_kernel_is_written_for_symbols():
     names = [*LAW_MODULES, *(kind.name for kind in kinds() if isinstance(kind, Kind))]
-    parts = {part for name in names for part in functions_within(law_function(name))}
+    parts = {part for name in names for part in collect_functions(law_function(name))}
     assert len(parts) > 500 and all(map(on_symbols, parts))
 
 

@@ -6,13 +6,16 @@ nothing is compiled twice. The compiler is loaded for what is in no file yet.
 
 from __future__ import annotations
 
+import hashlib
 import logging
 from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from osimlite.codegen.sources import compute_digest
 from osimlite.simulation.elements.laws import law_of
-from osimlite.simulation.engines.sources import digest_of
 
 if TYPE_CHECKING:
     from osimlite.simulation.engines.side_by_side import Made
@@ -22,6 +25,22 @@ _log = logging.getLogger(__name__)
 
 _addresses: dict[str, int] = {}
 """Addresses of the machine code of the laws that are ready, by their names."""
+
+
+SETTINGS = ("carrying.py", "compiler.py", "object_code.py", "tangents.py")
+"""The modules that set the compiler."""
+
+
+def digest_of(function: Any) -> str:
+    """Return the digest of a function and of the modules that set the compiler."""
+    return compute_digest(function, read_settings())
+
+
+@cache
+def read_settings() -> str:
+    """Return a digest of the modules that set the compiler."""
+    here = Path(__file__)
+    return hashlib.sha256(b"\0".join((here.with_name(name)).read_bytes() for name in SETTINGS)).hexdigest()
 
 
 def address_of(name: str) -> int:

@@ -14,9 +14,10 @@ from types import TracebackType
 from typing import NamedTuple
 
 from osimlite._cores import cores
+from osimlite.codegen.sources import collect_functions
 from osimlite.errors import OsimliteError
 from osimlite.simulation.elements.laws import law_of
-from osimlite.simulation.engines.sources import digest_of, functions_within
+from osimlite.simulation.engines.machine_code import digest_of
 
 SHARE = 14_000
 """So much Python code (bytes) is worth a process of its own: less is compiled before that has loaded the compiler."""
@@ -44,7 +45,7 @@ def shares(names: Sequence[str], cores: int) -> list[list[str]]:
 
 def size_of(name: str) -> int:
     """Python code (bytes) of a law: about as long it takes to compile."""
-    return sum(len(part.__code__.co_code) for part in functions_within(law_of(name)[0]))
+    return sum(len(part.__code__.co_code) for part in collect_functions(law_of(name)[0]))
 
 
 def compilers() -> int:

@@ -10,7 +10,7 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from osimlite.backends.javascript import as_javascript
+from osimlite.codegen.javascript import as_javascript
 from osimlite.kernels.paths import pull_path
 from osimlite.kernels.pointers import at
 from osimlite.kernels.table import LAW_MODULES

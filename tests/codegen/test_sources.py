@@ -6,15 +6,16 @@ from types import FunctionType
 
 import pytest
 
+from osimlite.codegen.sources import compute_digest
 from osimlite.kernels import constrained_dynamics, least_squares, pointers
 from osimlite.kernels.table import LAW_MODULES
 from osimlite.simulation.elements.laws import law_function
-from osimlite.simulation.engines import sources
+from osimlite.simulation.engines import machine_code
 
 
 def digests():
-    sources.digest_of.cache_clear()
-    return {name: sources.digest_of(law_function(name)) for name in LAW_MODULES}
+    compute_digest.cache_clear()
+    return {name: machine_code.digest_of(law_function(name)) for name in LAW_MODULES}
 
 
 @pytest.fixture
@@ -28,7 +29,7 @@ def changed(monkeypatch):
         return {law for law in before if before[law] != after[law]}
 
     yield edit
-    sources.digest_of.cache_clear()
+    compute_digest.cache_clear()
 
 
 def edited(function, **parts):
@@ -60,7 +61,7 @@ def test_words_and_places_concern_nobody(changed):
 
 
 def test_the_settings_of_the_compiler_concern_all(changed, monkeypatch):
-    monkeypatch.setattr(sources, "_settings", lambda: "other")
+    monkeypatch.setattr(machine_code, "read_settings", lambda: "other")
     assert changed(constrained_dynamics, "SAFE_MASS", constrained_dynamics.SAFE_MASS) == set(LAW_MODULES)
 
 

@@ -14,9 +14,9 @@ from functools import cache
 from types import FunctionType
 from typing import Any
 
-from osimlite.backends.reader import Function, Kernel, name_of
+from osimlite.codegen.reader import Function, Kernel, name_of
+from osimlite.codegen.sources import collect_functions
 from osimlite.kernels import pointers
-from osimlite.simulation.engines.sources import functions_within
 
 BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**", ast.BitAnd: "&"}
 COMPARED = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "===", ast.NotEq: "!=="}
@@ -50,7 +50,7 @@ def as_javascript(laws: Sequence[Function], others: Sequence[Function] = ()) -> 
     Raises:
         NotImplementedError: there is something in a kernel that has no counterpart here.
     """
-    every = dict.fromkeys(part for function in (*laws, *others) for part in functions_within(function))
+    every = dict.fromkeys(part for function in (*laws, *others) for part in collect_functions(function))
     texts = "\n".join(_text(function) for function in every if function not in POINTERS)
     numbered = ", ".join(("null", *map(name_of, laws)))
     named = "".join(f", {function.__name__}: {name_of(function)}" for function in others)
