@@ -12,6 +12,11 @@ from typing import Any, NamedTuple
 import pytest
 from hypothesis import settings
 
+from tests.suite import Suite
+
+# For the tests of tests/suite.py and tests/separate.py.
+pytest_plugins = ["pytester"]
+
 ROOT = Path(__file__).resolve().parent.parent
 # Reference data too large to commit. It stands beside the repository; tests that need it skip without it.
 SHARED = ROOT.parent / "shared"
@@ -25,8 +30,14 @@ settings.register_profile("osimlite", deadline=None, derandomize="CI" in os.envi
 settings.load_profile("osimlite")
 
 
-def pytest_configure() -> None:
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option that runs the full suite."""
+    parser.addoption("--full", action="store_true", help="run all tests, also those marked `full` (release, nightly)")
+
+
+def pytest_configure(config: pytest.Config) -> None:
     """Let commands that tests start be interrupted: a shell that starts pytest in the background has it ignore that."""
+    config.pluginmanager.register(Suite(config.getoption("--full")), "osimlite-suite")
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 

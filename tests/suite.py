@@ -1,0 +1,72 @@
+"""The quick and the full suite: the option ``--full``, and how tests ask which of the two runs."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+HOW = "`pytest --full` runs them"
+_ANSWER = "tests_of_the_full_suite"
+_state = {"full": False, "deselected": 0}
+
+
+def is_full() -> bool:
+    """Say whether the full suite runs: known before test modules are imported, in workers too."""
+    return _state["full"] is True
+
+
+def choose(quick: Any, full: Any) -> Any:
+    """Return the first value in the quick suite and the second in the full one: sizes, counts, spans of time."""
+    return full if is_full() else quick
+
+
+class Suite:
+    """Pytest plugin that leaves tests marked ``full`` out unless the option ``--full`` is given."""
+
+    def __init__(self, full: bool) -> None:
+        _state["full"] = full
+
+    def pytest_report_header(self) -> str:
+        """Name the suite. The count follows at the end: workers collect the tests, after this header."""
+        if is_full():
+            return "suite: full"
+        return f"suite: quick, without the tests marked `full`; {HOW}"
+
+    def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
+        """Deselect the tests of the full suite."""
+        if is_full():
+            return
+        slow = [item for item in items if item.get_closest_marker("full")]
+        if slow:
+            items[:] = [item for item in items if not item.get_closest_marker("full")]
+            config.hook.pytest_deselected(items=slow)
+        _state["deselected"] = len(slow)
+
+    def pytest_report_collectionfinish(self) -> list[str]:
+        """Count the tests that were left out, where this process has collected them itself."""
+        return _describe(_state["deselected"])
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        """Send the count from a worker of pytest-xdist to the process that reports."""
+        output = getattr(session.config, "workeroutput", None)
+        if output is not None:
+            output[_ANSWER] = _state["deselected"]
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: Any) -> None:
+        """Take the count from a worker; all workers collect the same tests."""
+        _state["deselected"] = getattr(node, "workeroutput", {}).get(_ANSWER, _state["deselected"])
+
+    def pytest_terminal_summary(self, terminalreporter: Any, config: pytest.Config) -> None:
+        """Repeat the count before pytest's last line, and let that line contain it."""
+        if getattr(config.option, "numprocesses", None):
+            # Pytest counts what it deselects in its own process only.
+            terminalreporter.stats.setdefault("deselected", [SimpleNamespace()] * _state["deselected"])
+            for line in _describe(_state["deselected"]):
+                terminalreporter.write_line(line)
+
+
+def _describe(count: int) -> list[str]:
+    return [f"{count} tests of the full suite are left out; {HOW}"] if count else []
