@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import sysconfig
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from html import escape
@@ -62,6 +63,8 @@ def executed(path: Path) -> Any:
     if len(found) == len(needed):
         # Pictures are shown by the backend that a kernel chooses where none is asked for.
         environment = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}
+        # `!osimlite` in a cell runs the command of this environment, also where the environment is not activated.
+        environment["PATH"] = os.pathsep.join([sysconfig.get_path("scripts"), environment.get("PATH", os.defpath)])
         with TemporaryDirectory() as folder:
             for file in found:
                 shutil.copy(file, folder)

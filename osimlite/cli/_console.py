@@ -153,7 +153,10 @@ class Facts:
         self.rows.append((name, words))
 
     def show(self) -> None:
-        """Print them as a table; what is too long for its column goes on in the next line."""
+        """Print them as a table; text that is too long for its column is wrapped between words.
+
+        A word is never broken: a path of a file stays whole, so that it can be copied and searched for.
+        """
         rows = [(visible(name), visible(words)) for name, words in self.rows]
         width = max((len(name) for name, _ in rows), default=0)
         room = columns() - width - 2
@@ -166,7 +169,7 @@ class Facts:
         if self.title:
             show(f"{italic}{visible(self.title)}{end}\n")
         for name, words in rows:
-            for line in wrap(words, room, break_on_hyphens=False) or [""]:
+            for line in wrap(words, room, break_on_hyphens=False, break_long_words=False) or [""]:
                 show(f"{bold}{name:{width}}{end}  {line}".rstrip() + "\n")
                 name = ""
 

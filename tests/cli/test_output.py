@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import pytest
 
 from osimlite.cli import main
-from osimlite.cli._console import Guarded, guarded_output
+from osimlite.cli._console import Facts, Guarded, guarded_output
 
 HOSTILE = "::error::##[add-mask]v1\x7f\x85\x9b31m\u202e\u2066\u2028\u00e9\u4e16"
 """What may stand in an XML attribute and still be obeyed by something."""
@@ -117,6 +117,13 @@ def test_output_of_any_encoding(folder: Path, encoding: str) -> None:
     # A model is no text of the terminal: it says itself that it is UTF-8.
     code, out, _ = call(folder, "build", "dynamic-walker", "-o", "-", encoding=encoding)
     assert code == 0 and out.decode("utf-8").startswith("<?xml") and out.endswith(b"</OpenSimDocument>\n")
+
+
+def test_no_path_of_a_file_is_broken_into_lines(capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    path = "/tmp/" + "pytest-of-somebody/" * 4 + "best.par"
+    Facts("search", [("runs", "40"), ("files", f"/tmp/best.osim, {path}")]).show()
+    assert path in capsys.readouterr().out.splitlines()[-1]
 
 
 def test_what_others_print_is_guarded_too(capsys: pytest.CaptureFixture[str]) -> None:
