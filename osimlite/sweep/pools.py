@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from functools import partial
 from multiprocessing import get_context
 from queue import SimpleQueue
@@ -28,6 +28,10 @@ MOST_LOSSES = 20
 
 PATIENCE = 30
 """So long a cluster may take to have its first worker, s."""
+
+
+WORKER_COUNT_AGE_S = 1.0
+"""A cluster is asked for its number of worker threads at most once in this time."""
 
 
 class ClusterLostError(OsimliteError):
@@ -212,8 +216,12 @@ class ClusterPool:
     @property
     def workers(self) -> int:
         """Threads of all workers, at least one."""
-        if time.monotonic() - self._asked > 1.0:
-            self._threads, self._asked = sum(self._client.nthreads().values()), time.monotonic()
+        if time.monotonic() - self._asked > WORKER_COUNT_AGE_S:
+            # A scheduler that does not answer may come back: the client tries for a while, and `result` raises an
+            # error if it gives up.
+            with suppress(OSError, TimeoutError):
+                self._threads = sum(self._client.nthreads().values())
+            self._asked = time.monotonic()
         return max(1, self._threads)
 
     def submit(self, tag: Any, values: Any) -> None:
@@ -221,7 +229,12 @@ class ClusterPool:
         self._submit(tag, values, 0)
 
     def _submit(self, tag: Any, values: Any, losses: int) -> None:
-        future = self._client.submit(elsewhere, self._work, values, osimlite.__version__, pure=False)
+        try:
+            future = self._client.submit(elsewhere, self._work, values, osimlite.__version__, pure=False)
+        except Exception as error:
+            if type(error).__name__ == "ClosedClientError":
+                raise self._lost() from None
+            raise
         self._tasks[future.key] = tag, values, losses, future
         future.add_done_callback(self._done.put)
 

@@ -21,7 +21,7 @@ from osimlite.sweep.run import sweep
 from osimlite.sweep.sampling import samples
 from tests.sweep.test_controls import pulled
 
-pytest.importorskip("distributed", reason="needs dask.distributed (extra 'sweep')")
+distributed = pytest.importorskip("distributed", reason="needs dask.distributed (extra 'sweep')")
 pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
 
 WORKER = ["worker", "--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1"]
@@ -220,7 +220,12 @@ def test_a_scheduler_that_goes_is_told_and_nothing_is_lost(tmp_path_factory, wal
             if done > 40:
                 lost.processes[0].kill()
 
+        # Workers start slowly on a busy machine; only the wait for a scheduler that has gone is to be short.
+        with distributed.Client(lost.address, set_as_default=False) as client:
+            client.wait_for_workers(1, timeout=120)
         monkeypatch.setattr("osimlite.sweep.pools.PATIENCE", 5)
+        # The scheduler is asked for its workers after every task, also right after it was killed.
+        monkeypatch.setattr("osimlite.sweep.pools.WORKER_COUNT_AGE_S", 0.0)
         with pytest.raises(OsimliteError, match="has gone; go on with --resume"):
             sweep(made, chosen, tmp_path / "r.parquet", cluster=lost.address, progress=end)
     finally:
