@@ -154,12 +154,22 @@ def _angle(y: Any, x: Any) -> Any:
     return part + (math.atan2(float(y), float(x)) - part.v)
 
 
+def _copy_sign(x: Any, y: float) -> Any:
+    """Return x with the sign of y; at x = 0 its slope is the one that `SLOPES` of `carrying.py` has there."""
+    if not isinstance(x, Jet):
+        return math.copysign(x, y)
+    value = math.copysign(x.v, y)
+    # |x| has no derivative at 0: a number that is not negative keeps its derivatives unless the sign is changed.
+    same_sign = (x.v < 0.0) == (value < 0.0)
+    return x.through(value, 1.0 if same_sign else -1.0, 0.0)
+
+
 MATHEMATICS: dict[str, Callable[..., Any]] = {name: _of_one(name) for name in SLOPES} | {
     "atan2": _angle,
     "radians": lambda x: x * (math.pi / 180.0),
     "degrees": lambda x: x * (180.0 / math.pi),
     "hypot": lambda *x: MATHEMATICS["sqrt"](sum(each * each for each in x)),
-    "copysign": lambda x, y: abs(x) if math.copysign(1.0, float(y)) > 0.0 else -abs(x),
+    "copysign": lambda x, y: _copy_sign(x, float(y)),
     "floor": lambda x: math.floor(float(x)),
     "ceil": lambda x: math.ceil(float(x)),
     "isnan": lambda x: math.isnan(float(x)),

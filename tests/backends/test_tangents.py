@@ -30,7 +30,7 @@ from math import (
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 pytest.importorskip("numba", reason="needs numba (extra 'sim')")
@@ -139,6 +139,11 @@ def test_what_has_no_rule_is_refused_by_name():
 numbers = st.floats(-3.0, 3.0), st.floats(0.05, 4.0)
 
 
+# Where a function has a corner, the values themselves decide, and the sign of a zero.
+@example(0.0, 1.0, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+@example(-0.0, 1.0, [1.0, -1.0, 0.5, 0.0, 1.0, 2.0])
+@example(1.0, 1.0, [1.0, -1.0, 0.5, 0.0, 1.0, 2.0])
+@example(0.7, 0.7, [1.0, -1.0, 0.5, 0.0, 1.0, 2.0])
 @given(*numbers, st.lists(st.floats(-2.0, 2.0), min_size=2 * WAYS, max_size=2 * WAYS))
 def test_every_rule_is_that_of_python(a, b, along):
     y = np.column_stack(([a, b], np.reshape(along, (2, WAYS))))
