@@ -141,9 +141,12 @@ class _Writer(Kernel, ast.NodeTransformer):
         self.number, self.is_divided = 0, False
         self.cleared: set[str] = set()
 
+    def parse(self, function: Function) -> ast.FunctionDef:
+        """Return a tree that can be rewritten."""
+        return copy.deepcopy(super().parse(function))
+
     def made(self) -> Any:
         """The function."""
-        # It was read for this, and nobody else has it.
         tree = self.tree
         body = [part for item in self.body for part in self._listed(self.visit(item))]
         clear = [ast.Assign([_set(name)], _name("unset_")) for name in sorted(self.cleared - set(self.given))]

@@ -112,7 +112,7 @@ class _Writer(Kernel):
                 return ["continue;"]
             case ast.Pass():
                 return []
-        raise self.unknown(node)
+        raise self.refuse(node)
 
     def assigned(self, targets: Sequence[ast.expr], value: ast.expr) -> list[str]:
         if len(targets) == 1 and not isinstance(targets[0], ast.Tuple):
@@ -178,7 +178,7 @@ class _Writer(Kernel):
                 return f"...{self.of(value)}"
             case ast.Call(func=function, args=given, keywords=[]):
                 return self.call(self.value(function), [self.of(part) for part in given], node)
-        raise self.unknown(node)
+        raise self.refuse(node)
 
     def call(self, called: Any, given: Sequence[str], node: ast.expr) -> str:
         if called in POINTERS:
@@ -190,7 +190,7 @@ class _Writer(Kernel):
         elif called in vars(math).values():
             name = f"Math.{called.__name__}"
         else:
-            raise self.unknown(node)
+            raise self.refuse(node)
         return f"{name}({', '.join(given)})"
 
     def constant(self, node: ast.Name | ast.Attribute) -> str:
@@ -199,7 +199,7 @@ class _Writer(Kernel):
             return f"[{', '.join(map(_number, value))}]"
         if isinstance(value, int | float):
             return _number(value)
-        raise self.unknown(node)
+        raise self.refuse(node)
 
 
 def _local(name: str) -> str:

@@ -8,15 +8,19 @@ from __future__ import annotations
 
 import ast
 import builtins
-import inspect
+import linecache
 from collections.abc import Callable
 from functools import cached_property
-from textwrap import dedent
 from typing import Any
 
+from osimlite.errors import UnsupportedError
 from osimlite.kernels.layout import Record
 
 Function = Callable[..., Any]
+
+
+class TranslationError(UnsupportedError, NotImplementedError):
+    """A kernel uses something of Python that a writer has no counterpart for."""
 
 
 class Kernel:
@@ -34,11 +38,14 @@ class Kernel:
     """
 
     def __init__(self, function: Function, language: str) -> None:
-        (tree,) = ast.parse(dedent(inspect.getsource(function))).body
-        assert isinstance(tree, ast.FunctionDef)
+        tree = self.parse(function)
         self.function, self.tree, self.language = function, tree, language
         self.body = tree.body[1:] if ast.get_docstring(tree) else tree.body
         self.given = [argument.arg for argument in tree.args.args]
+
+    def parse(self, function: Function) -> ast.FunctionDef:
+        """Return the tree of a function, which all kernels share that read it."""
+        return find_tree(function)
 
     @cached_property
     def own(self) -> list[str]:
@@ -59,9 +66,55 @@ class Kernel:
         scope = self.function.__globals__
         return scope[name] if name in scope else getattr(builtins, name, None)
 
-    def unknown(self, node: ast.AST) -> NotImplementedError:
-        """The error for what the language has not."""
-        return NotImplementedError(f"{self.name} has what is no {self.language} here: {ast.unparse(node)}")
+    @property
+    def file(self) -> str:
+        """The file of its source."""
+        return self.function.__code__.co_filename
+
+    def line_of(self, node: ast.AST) -> int:
+        """Return the line of a part of the function in its file."""
+        return getattr(node, "lineno", self.tree.lineno)
+
+    def refuse(self, node: ast.AST, reason: str = "") -> TranslationError:
+        """Return the error for a part that the language has no counterpart for.
+
+        Args:
+            node: the part of the function.
+            reason: what is wrong with it, as a clause; empty if it is not supported at all.
+        """
+        text = " ".join(ast.unparse(node).split())
+        text = text if len(text) <= LONGEST_QUOTE else f"{text[:LONGEST_QUOTE]}..."
+        message = f"the function '{self.name}' cannot be written as {self.language}: {text}"
+        message += f" ({reason})" if reason else " is not supported"
+        return TranslationError(message, file=self.file, line=self.line_of(node))
+
+
+_parsed: dict[str, tuple[list[str], dict[tuple[int, str], ast.FunctionDef]]] = {}
+"""By file, its lines and the functions in it, by the line that they begin in and their name."""
+
+
+def find_tree(function: Function) -> ast.FunctionDef:
+    """Return the tree of a function from the file that it is in.
+
+    Raises:
+        OSError: there is no such file, or the function is not there any more.
+    """
+    file = function.__code__.co_filename
+    linecache.checkcache(file)
+    lines = linecache.getlines(file, function.__globals__)
+    if file not in _parsed or _parsed[file][0] is not lines:
+        trees = [node for node in ast.walk(ast.parse("".join(lines))) if isinstance(node, ast.FunctionDef)]
+        starts = [min([tree.lineno, *(part.lineno for part in tree.decorator_list)]) for tree in trees]
+        found = {(start, tree.name): tree for start, tree in zip(starts, trees, strict=True)}
+        _parsed[file] = lines, found
+    key = function.__code__.co_firstlineno, function.__code__.co_name
+    if key not in _parsed[file][1]:
+        raise OSError(f"{file} has no function {key[1]} in line {key[0]}: it has changed, or its text is not kept")
+    return _parsed[file][1][key]
+
+
+LONGEST_QUOTE = 100
+"""Characters of the code that an error message quotes."""
 
 
 def name_of(function: Function) -> str:
