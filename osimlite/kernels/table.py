@@ -76,6 +76,7 @@ LAW_MODULES = {
     "wrapped_path": "path_wraps",
     "geodesic_path": "geodesic_paths",
     "inverse": "dynamics",
+    "assemble_poses": "assembly",
 }
 """The module of each of the engine's own."""
 

@@ -113,6 +113,11 @@ def _nearest(mechanism: Mechanism, wanted: Array, time: float, held: Mapping[int
     return q
 
 
+def tolerance_of(mechanism: Mechanism) -> float:
+    """Return what an equation of an assembled pose may be off (m or rad)."""
+    return max(mechanism.assembly_accuracy / 10.0, _FINEST)
+
+
 class _Search:
     """Half the sum of squared changes of the coordinates that count, on the surface where the constraints hold."""
 
@@ -122,7 +127,7 @@ class _Search:
         self.free = [index for index in range(len(wanted)) if index not in held]
         self.start = wanted.copy()
         self.start[list(held)] = list(held.values())
-        self.tolerance = max(mechanism.assembly_accuracy / 10.0, _FINEST)
+        self.tolerance = tolerance_of(mechanism)
         # OpenSim leaves such a pose as it is; its integrator takes the shortest way to the constraints.
         self.assembled = bool(np.abs(_errors(self._state(self.start))).max(initial=0.0) <= self.tolerance)
         # Otherwise what does not count gives way first; what depends on others follows them.

@@ -177,7 +177,10 @@ NO_RATES = {
         "whole motions, which are followed step by step",
     ),
     **dict.fromkeys(("euler2", "adams", "bdf", "rosenbrock"), "methods that no derivatives are followed along"),
-    **dict.fromkeys(("fit_frames", "least_effort", "watch", "look", "push_each"), "searches and looks at many poses"),
+    **dict.fromkeys(
+        ("fit_frames", "assemble_poses", "least_effort", "watch", "look", "push_each"),
+        "searches and looks at many poses",
+    ),
     **dict.fromkeys(("equilibrate", "project"), "what finds a start, which is held"),
     **{name: "curves of paths, for pictures" for name in LAW_MODULES if name.startswith("trace_")},
     **dict.fromkeys(

@@ -100,7 +100,7 @@ def test_what_is_not_known_is_an_error():
 
 def test_all_kernels_are_translated_but_those_with_named_tuples():
     """Pages compute paths; muscles and the engine's own loops are told apart by the tuples that they are given."""
-    named = re.compile(r": (MuscleInputs|Motion|Fit|Walk)\(|: [am]\.")
+    named = re.compile(r": (MuscleInputs|Motion|Fit|Assembly|Walk)\(|: [am]\.")
     translated = set()
     for name in [*LAW_MODULES, *(kind.name for kind in kinds() if isinstance(kind, Kind))]:
         try:

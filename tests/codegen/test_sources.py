@@ -45,7 +45,8 @@ def test_an_edited_function_concerns_those_that_call_it(changed):
     result = changed(least_squares, "reflect", edited(reflect, co_consts=constants))
     # `project` solves by the addresses of these laws.
     paths = {"cable_path", "geodesic_path"}
-    assert result == {"factorise_law", "minimum_norm_law", "constrained_dynamics", "fit_frames", *paths}
+    searches = {"fit_frames", "assemble_poses"}
+    assert result == {*paths, *searches, "factorise_law", "minimum_norm_law", "constrained_dynamics"}
 
 
 def test_a_changed_number_concerns_those_that_use_it(changed):

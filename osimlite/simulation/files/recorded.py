@@ -255,8 +255,10 @@ class RecordedMotion(Movement):
         Raises:
             SimulationError: a pose is too far from fulfilling them.
         """
-        poses = [self.mechanism.assemble(q, float(time)) for time, q in zip(self.times, self.values, strict=True)]
-        return RecordedMotion(self.mechanism, self.times, np.array(poses), self.missing, self.ignored)
+        from osimlite.simulation.pose_assembly import assemble_motion
+
+        poses = assemble_motion(self.mechanism, self.times, self.values)
+        return RecordedMotion(self.mechanism, self.times, poses, self.missing, self.ignored)
 
     def bodies(self) -> StoTable:
         """Mass centre of each body (m) and its body-fixed X-Y-Z angles (degrees) in ground, then the mass centre."""

@@ -1,0 +1,94 @@
+"""Assembly of the poses of a whole motion by the kernels, in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from osimlite.kernels import assembly
+from osimlite.kernels.layout import CONSTRAINED, MODEL
+from osimlite.kernels.table import LAW_NUMBERS
+from osimlite.multibody.assembly import tolerance_of
+from osimlite.multibody.constraints import Coupler, Lock
+from osimlite.multibody.mechanism import Mechanism
+from osimlite.multibody.spatial import Array
+from osimlite.simulation.engines.linking import AT_HAND, Code, best
+
+ENTRY = "assemble_poses"
+FEW_POSES = 20
+"""So many poses are sooner assembled by Python than the kernel is compiled."""
+
+
+def assemble_motion(mechanism: Mechanism, times: Array, values: Array, code: Code | None = None) -> Array:
+    """Return the poses nearest to given ones that fulfil the constraints, by the rules of `Mechanism.assemble`.
+
+    Args:
+        mechanism: what moves.
+        times: of the poses (t,), s.
+        values: of all coordinates (t, n), rad and m.
+        code: what runs the kernels; by default machine code, for a few poses only where it is compiled already.
+
+    Returns:
+        The assembled values (t, n).
+
+    Raises:
+        SimulationError: no pose near one of these fulfils the constraints.
+    """
+    if all(isinstance(item, Lock) for item in mechanism.constraints):
+        return values.copy()
+    if code is None:
+        code = best() if len(times) > FEW_POSES else AT_HAND
+    program = mechanism.program
+    order = program.order
+    size = len(order)
+    functions = (ENTRY, *program.laws)
+    code = code.chosen_for(functions)
+    code.make_ready(functions)
+    ints = np.array(program.model, dtype=np.int64)
+    for name in program.laws:
+        ints[MODEL.LAWS + LAW_NUMBERS[name]] = code.address(name)
+    equations = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS])
+    frames, found = np.column_stack([times, values[:, order]]), np.empty((len(times), size + 1))
+    code.entry(ENTRY)(
+        ints,
+        np.array(program.reals, dtype=np.float64),
+        np.zeros(int(ints[MODEL.WORK_SIZE])),
+        np.zeros(2 * size),
+        np.zeros(2 * size),
+        np.array(_integers(mechanism, order), dtype=np.int64),
+        np.array(_numbers(mechanism, order)),
+        np.zeros(assembly.assembly_room(equations, size)),
+        np.ascontiguousarray(frames),
+        found,
+        len(times),
+    )
+    result: Array = np.empty_like(values)
+    result[:, order] = found[:, :size]
+    for row in np.flatnonzero(found[:, size] != assembly.ASSEMBLED).tolist():
+        # The search in Python has the words for what is wrong.
+        result[row] = mechanism.assemble(values[row], float(times[row]))
+    return result
+
+
+def _integers(mechanism: Mechanism, order: Sequence[int]) -> list[int]:
+    """Integers of the assembly, see `kernels.assembly`."""
+    program, infos = mechanism.program, [mechanism.coordinates[place] for place in order]
+    turning = any(not program.bound.isdisjoint(item.coordinates) for item in mechanism.turning)
+    couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
+    result = [int(program.on_bodies or turning), len(couplers)]
+    result += [assembly.HELD_BY_USER if info.locked else assembly.FREED for info in infos]
+    result += [int(not info.yielding) for info in infos]
+    result += [int(info.clamped) for info in infos]
+    result += [0] * len(infos)
+    for item in couplers:
+        result += [order.index(item.dependent), program.equations_of(item)[0]]
+    return result
+
+
+def _numbers(mechanism: Mechanism, order: Sequence[int]) -> list[float]:
+    """Numbers of the assembly, see `kernels.assembly`."""
+    result = [tolerance_of(mechanism)]
+    for place in order:
+        result += mechanism.coordinates[place].range
+    return result
