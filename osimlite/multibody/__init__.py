@@ -12,18 +12,19 @@ if TYPE_CHECKING:
     from osimlite.multibody.dynamics import Wrench as Wrench
     from osimlite.multibody.mechanism import Mechanism as Mechanism
 
-_get = imported_when_used(
-    __name__,
-    {
-        "Mechanism": "osimlite.multibody.mechanism",
-        "Wrench": "osimlite.multibody.dynamics",
-        "build_mechanism": "osimlite.multibody.build",
-    },
-)
+_NUMERIC = {
+    "Mechanism": "osimlite.multibody.mechanism",
+    "Wrench": "osimlite.multibody.dynamics",
+    "build_mechanism": "osimlite.multibody.build",
+}
+"""Names of this package whose modules need numpy, and these modules."""
+
+_get = imported_when_used(__name__, _NUMERIC)
 
 
 def __getattr__(name: str) -> Any:
-    # The linter asks which joint carries which body, without numpy.
-    if not name.startswith("_"):
+    # `from osimlite.multibody import functions` asks for the name of a module too, before it is imported. The linter
+    # needs such modules without numpy, so only the names above may ask for it.
+    if name in _NUMERIC:
         require("numpy", extra="sim", purpose="a mechanism")
     return _get(name)
