@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import pytest
 from hypothesis import settings
 
+from tests import separate
 from tests.suite import Suite
 
 # For the tests of tests/suite.py and tests/separate.py.
@@ -38,6 +39,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Let commands that tests start be interrupted: a shell that starts pytest in the background has it ignore that."""
     config.pluginmanager.register(Suite(config.getoption("--full")), "osimlite-suite")
+    if not separate.is_server(config):
+        config.pluginmanager.register(separate, "osimlite-check-protocol")
+        config.pluginmanager.register(separate.Checks(config), "osimlite-checks")
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 

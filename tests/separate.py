@@ -1,18 +1,291 @@
-"""Checks in a process of their own: OpenSim has a library of the name of CasADi's, and one process cannot load both."""
+"""Collection of ``check_*.py``: tests that run in a second process beside the one that collects them.
+
+OpenSim brings a library of the same name as CasADi's, and one process cannot load both. Tests of functions that need
+CasADi are therefore in files ``check_*.py``. The process that collects such files starts a server (``python -m
+tests.separate``), asks it for the tests in them, and lets it run them; each is a test with its own name, marks and
+duration. A server keeps what it has imported, so that its imports are paid once.
+"""
 
 from __future__ import annotations
 
+import atexit
+import contextlib
+import json
+import os
 import subprocess
 import sys
+import tempfile
+from collections.abc import Generator, Iterator, Sequence
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
-from tests.conftest import ROOT
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+_SERVER = "osimlite-check-server"
 
 
-def run_checks(folder: Path) -> None:
-    """Run the files check_*.py of a folder, all in one process, which loads and compiles once what they share."""
-    files = sorted(map(str, folder.glob("check_*.py")))
-    assert files
-    command = [sys.executable, "-m", "pytest", "-n0", "-q", "-p", "no:cacheprovider", *files]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, encoding="utf-8", check=False)
-    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+class ServerDiedError(Exception):
+    """The server ended while it ran or collected tests."""
+
+
+class CheckServer:
+    """A process that collects and runs tests of ``check_*.py``."""
+
+    def __init__(self, folder: Path) -> None:
+        self.log = tempfile.TemporaryFile()  # noqa: SIM115
+        paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+        # Variables of pytest-xdist make pytest believe that it is a worker.
+        variables = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_XDIST")}
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "tests.separate"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self.log,
+            text=True,
+            encoding="utf-8",
+            cwd=folder,
+            env={**variables, "PYTHONPATH": os.pathsep.join(paths)},
+        )
+        atexit.register(self.close)
+
+    def ask(self, *words: str) -> Iterator[Any]:
+        """Call pytest in the server, and return what it reports as it comes."""
+        assert self.process.stdin is not None and self.process.stdout is not None
+        with contextlib.suppress(OSError):
+            self.process.stdin.write(json.dumps(words) + "\n")
+            self.process.stdin.flush()
+        for line in self.process.stdout:
+            answer = json.loads(line)
+            if answer is None:
+                return
+            yield answer
+        self.process.wait()
+        self.log.seek(0)
+        end = self.log.read().decode(errors="replace")[-4000:]
+        raise ServerDiedError(f"the process of the checks ended with {self.process.returncode}\n{end}")
+
+    def close(self) -> None:
+        """End the process, even in the middle of a test."""
+        atexit.unregister(self.close)
+        self.process.kill()
+        self.process.communicate()
+        self.log.close()
+
+
+class Checks:
+    """Pytest plugin that collects ``check_*.py`` and runs them in a server."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        self.config = config
+        self._server: CheckServer | None = None
+        self._reports: dict[str, list[Any]] = {}
+        self._requested: set[str] = set()
+        self._running: Iterator[Any] = iter(())
+
+    @property
+    def server(self) -> CheckServer:
+        """The server, started by the first that needs it."""
+        if self._server is None:
+            self._server = CheckServer(self.config.rootpath)
+        return self._server
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> Generator[None, Any, Any]:
+        """Collect a file of checks by the server, and not also as an ordinary module when it is named explicitly."""
+        collectors = yield
+        if not file_path.match("check_*.py"):
+            return collectors
+        return [CheckFile.from_parent(parent, path=file_path, checks=self)]
+
+    def collect(self, path: Path) -> list[dict[str, Any]]:
+        """Return name, line and marks of each test in a file.
+
+        Raises:
+            CollectError: the file cannot be imported, for example.
+        """
+        try:
+            answers = list(self.server.ask("--collect-only", "--full", str(path)))
+        except ServerDiedError as error:
+            self.drop_server()
+            raise pytest.Collector.CollectError(str(error)) from None
+        for answer in answers:
+            if "error" in answer:
+                raise pytest.Collector.CollectError(answer["error"])
+        return answers
+
+    def reports(self, item: CheckItem) -> list[Any]:
+        """Return pytest's reports of one test: run it, or wait for it where its file is being run."""
+        name = item.name
+        key = item.nodeid
+        try:
+            if key not in self._requested:
+                self._run([other for other in self._with(item) if other.nodeid not in self._reports])
+            while not any(report["when"] == "teardown" for report in self._reports.get(key, ())):
+                report = next(self._running)
+                self._reports.setdefault(report["nodeid"], []).append(report)
+        except StopIteration:
+            raise ServerDiedError(f"the process of the checks has not run {name}") from None
+        except ServerDiedError:
+            self.drop_server()
+            raise
+        return self._reports[key]
+
+    def _with(self, item: CheckItem) -> list[pytest.Item]:
+        """Return a test and all others that this process will run of its file."""
+        if getattr(self.config, "workerinput", None) and self.config.getoption("dist", "no") != "loadfile":
+            # Other workers run some of the others.
+            return [item]
+        return [other for other in item.session.items if isinstance(other, CheckItem) and other.path == item.path]
+
+    def _run(self, items: Sequence[pytest.Item]) -> None:
+        for report in self._running:
+            # Tests of another file that nobody has waited for.
+            self._reports.setdefault(report["nodeid"], []).append(report)
+        self._requested.update(item.nodeid for item in items)
+        options = ["--full"] if self.config.getoption("--full", False) else []
+        self._running = self.server.ask(*options, *(item.nodeid for item in items))
+
+    def drop_server(self) -> None:
+        """Forget a server that has died: the next test starts another."""
+        self._running = iter(())
+        self._requested = set(self._reports)
+        if self._server is not None:
+            self._server.close()
+            self._server = None
+
+    def pytest_unconfigure(self) -> None:
+        """End the server."""
+        self.drop_server()
+
+
+class CheckFile(pytest.File):
+    """A file of tests that run in the server."""
+
+    def __init__(self, *, checks: Checks, **words: Any) -> None:
+        super().__init__(**words)
+        self.checks = checks
+
+    def collect(self) -> Iterator[pytest.Item]:
+        """Yield its tests.
+
+        Raises:
+            Skipped: CasADi is not installed.
+        """
+        if find_spec("casadi") is None:
+            raise pytest.skip.Exception("needs the casadi package", allow_module_level=True)
+        for answer in self.checks.collect(self.path):
+            item: CheckItem = CheckItem.from_parent(self, name=answer["name"], line=answer["line"])
+            for mark in answer["marks"]:
+                item.add_marker(mark)
+            yield item
+
+
+class CheckItem(pytest.Item):
+    """A test that runs in the server."""
+
+    parent: CheckFile
+
+    def __init__(self, *, line: int, **words: Any) -> None:
+        super().__init__(**words)
+        self.line = line
+
+    def runtest(self) -> None:
+        """Do nothing: the reports are those of the server."""
+
+    def reportinfo(self) -> tuple[Path, int, str]:
+        """Say where the test is."""
+        return self.path, self.line, self.name
+
+    def run(self) -> list[pytest.TestReport]:
+        """Let the server run the test, and return its reports."""
+        try:
+            reports = self.parent.checks.reports(self)
+        except ServerDiedError as error:
+            return [
+                pytest.TestReport(self.nodeid, self.location, {}, "failed", str(error), "call"),
+                pytest.TestReport(self.nodeid, self.location, {}, "passed", None, "teardown"),
+            ]
+        for data in reports:
+            if data["outcome"] == "skipped" and isinstance(data["longrepr"], list):
+                # JSON has no tuples, and pytest asks for one here.
+                data["longrepr"] = tuple(data["longrepr"])
+        return [self.config.hook.pytest_report_from_serializable(config=self.config, data=data) for data in reports]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
+    """Report what the server reports of a check; nothing of it is set up in this process."""
+    if not isinstance(item, CheckItem):
+        return None
+    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    for report in item.run():
+        item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
+
+
+class Answers:
+    """Pytest plugin of the server: it writes tests and reports as lines of JSON."""
+
+    def __init__(self, stream: Any) -> None:
+        self.stream = stream
+        self.config: pytest.Config | None = None
+
+    def pytest_configure(self, config: pytest.Config) -> None:
+        """Keep what serialises reports."""
+        self.config = config
+
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        """Write what has been collected, where no more is asked."""
+        if session.config.option.collectonly:
+            for item in session.items:
+                marks = sorted({mark.name for mark in item.iter_markers()} & {"full", "oracle", "corpus"})
+                self.write({"name": item.name, "line": item.location[1] or 0, "marks": marks})
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        """Write why a file cannot be collected."""
+        if report.failed:
+            self.write({"error": str(report.longrepr)})
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Write the report of one phase of one test."""
+        assert self.config is not None
+        self.write(self.config.hook.pytest_report_to_serializable(config=self.config, report=report))
+
+    def write(self, answer: Any) -> None:
+        """Write one line."""
+        self.stream.write(json.dumps(answer, default=str) + "\n")
+        self.stream.flush()
+
+
+def is_server(config: pytest.Config) -> bool:
+    """Say whether this is pytest in the server."""
+    return config.pluginmanager.has_plugin(_SERVER)
+
+
+def serve() -> None:
+    """Call pytest for each line of JSON on standard input; a line ``null`` ends what it reports."""
+    stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    # What pytest prints is in its reports; and libraries print to the file descriptor.
+    with open(os.devnull, "w") as nothing:
+        os.dup2(nothing.fileno(), 1)
+    answers = Answers(stream)
+
+    class Server:
+        """Pytest plugin that registers the other under the name that `is_server` asks for."""
+
+        def pytest_addoption(self, pluginmanager: pytest.PytestPluginManager) -> None:
+            pluginmanager.register(answers, _SERVER)
+
+    for line in sys.stdin:
+        words = json.loads(line)
+        pytest.main(
+            ["-p", "xdist", "-n0", "-q", "-p", "no:cacheprovider", "-p", "no:randomly", *words], plugins=[Server()]
+        )
+        answers.write(None)
+
+
+if __name__ == "__main__":
+    serve()

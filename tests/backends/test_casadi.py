@@ -1,22 +1,13 @@
-"""The checks of the functions of CasADi, and what is said where there is none."""
+"""What is said where functions of CasADi cannot be made; `check_*.py` test the functions themselves."""
 
 from __future__ import annotations
 
 import sys
-from importlib.util import find_spec
-from pathlib import Path
 
 import pytest
 
 import osimlite
 from osimlite.models.walkers import furthest_walker
-from tests.separate import run_checks
-
-
-@pytest.mark.skipif(find_spec("casadi") is None, reason="needs the casadi package")
-@pytest.mark.timeout(1800)
-def test_checks():
-    run_checks(Path(__file__).parent)
 
 
 def test_what_is_missing_is_said(monkeypatch):
