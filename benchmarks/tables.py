@@ -81,6 +81,7 @@ def validated(folder: Path) -> tuple[float, float, float]:
     )
     command = [sys.executable, "-m", "osimlite", "validate", str(folder), "--format", "concise"]
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    environment["XDG_CACHE_HOME"] = str(folder / ".cache")
     start = time.perf_counter()
     done = subprocess.run(
         [sys.executable, "-c", code, *command], env=environment, capture_output=True, text=True, check=True
@@ -105,7 +106,7 @@ def main() -> None:
             runs = []
             for _ in range(options.rounds):
                 if name == "first run":
-                    rmtree(folder / ".osimlite_cache", ignore_errors=True)
+                    rmtree(folder / ".cache", ignore_errors=True)
                 runs.append(validated(folder))
             used, clock, memory = map(median, zip(*runs, strict=True))
             table.add_row(name, f"{used:.2f}", f"{size / 1e6 / used:.0f}", f"{clock:.2f}", f"{memory:.0f}")

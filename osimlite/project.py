@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-import math
+import sys
 from pathlib import Path
 from typing import Any
 
 from osimlite.errors import OsimliteError
+from osimlite.reading import read_at_most
 
 LARGEST_FILE = 100_000_000
 """The most bytes that are read of a file where no settings allow more; models have some million at most."""
+LARGEST_SETTINGS = 10_000_000
+"""The most bytes of a file of settings: a pyproject.toml has some thousand."""
 
 
 def settings_table(folder: Path) -> tuple[Path, dict[str, Any]] | None:
@@ -38,7 +41,9 @@ def largest_file(folder: Path) -> int:
 def largest_file_in(file: Path, table: dict[str, Any]) -> int:
     """The most bytes of a file by the settings in `file`; OsimliteError if they make no sense."""
     given = table.get("largest-file", LARGEST_FILE / 1e6)
-    if isinstance(given, bool) or not isinstance(given, int | float) or not LARGEST_FILE <= given * 1e6 < math.inf:
+    is_number = isinstance(given, int | float) and not isinstance(given, bool)
+    # TOML has integers of any length, of which most are no floating-point number.
+    if not is_number or not LARGEST_FILE / 1e6 <= given <= sys.float_info.max / 1e6:
         raise OsimliteError(
             f"'largest-file' must be a number of MB, {LARGEST_FILE / 1e6:g} or more, not '{given}'", file=str(file)
         )
@@ -48,12 +53,16 @@ def largest_file_in(file: Path, table: dict[str, Any]) -> int:
 def _table(file: Path, *, whole: bool) -> dict[str, Any] | None:
     import tomllib
 
+    text = read_at_most(file, LARGEST_SETTINGS + 1)
+    if len(text) > LARGEST_SETTINGS:
+        message = f"settings of more than {LARGEST_SETTINGS / 1e6:g} MB are not read"
+        raise OsimliteError(message, file=str(file))
     try:
-        with file.open("rb") as stream:
-            data = tomllib.loads(stream.read(LARGEST_FILE).decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise OsimliteError(f"this is no TOML: {error}", file=str(file)) from None
-    except OSError as error:
-        raise OsimliteError(f"cannot read the settings: {error.strerror}", file=str(file)) from None
-    table = data if whole else data.get("tool", {}).get("osimlite")
-    return table if isinstance(table, dict) else None
+        data: Any = tomllib.loads(text.decode())
+    except (ValueError, RecursionError) as error:
+        # A deep nesting of brackets ends the parser's recursion; its message says only that.
+        reason = "brackets nest too deeply" if isinstance(error, RecursionError) else error
+        raise OsimliteError(f"this is no TOML: {reason}", file=str(file)) from None
+    for key in () if whole else ("tool", "osimlite"):
+        data = data.get(key) if isinstance(data, dict) else None
+    return data if isinstance(data, dict) else None

@@ -13,6 +13,7 @@ import numpy as np
 from osimlite.backends.stated import StatedModel
 from osimlite.backends.tangents import TangentModel
 from osimlite.errors import SettingError, UnsupportedError
+from osimlite.files import make_folder
 from osimlite.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import GROUND, Mechanism
@@ -23,6 +24,7 @@ from osimlite.simulation.elements.probe import DeclaredProbe
 from osimlite.simulation.pack import Packed, pack
 from osimlite.simulation.states import in_model_order
 from osimlite.text import did_you_mean
+from osimlite.writing import write_into
 
 if TYPE_CHECKING:
     from osimlite.backends.given_paths import SearchedPaths
@@ -428,7 +430,7 @@ class CasadiModel(StatedModel):
                 "paths around surfaces are searched for by osimlite, which files cannot do; put polynomials in their "
                 "places first (osimlite modify --replace paths=polynomial)"
             )
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         written = []
         generator = self._library.CodeGenerator("model.c", {"with_header": True})
         for name in names:
@@ -447,7 +449,7 @@ class CasadiModel(StatedModel):
             "p": self.p.tolist(),
             "functions": {name: str(getattr(self, name)) for name in names},
         }
-        (folder / "model.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
+        write_into(folder, "model.json", json.dumps(facts, indent=1) + "\n")
         return [*written, folder / "model.c", folder / "model.h", folder / "model.json"]
 
 

@@ -11,9 +11,10 @@ from zlib import crc32
 
 from osimlite import __version__
 from osimlite.errors import OsimliteError
-from osimlite.files import read_file, write_atomically
-from osimlite.lint.cache import folder_for, key_of
+from osimlite.files import read_file
+from osimlite.lint.cache import key_of
 from osimlite.lint.config import Config
+from osimlite.writing import user_cache_folder, write_cached
 
 
 def answered(question: str, file: str, data: bytes, find: Callable[[], tuple[str, bool]]) -> str:
@@ -27,14 +28,15 @@ def answered(question: str, file: str, data: bytes, find: Callable[[], tuple[str
     """
     key = [question, key_of(file, Config()), blake2b(data).hexdigest()]
     place = crc32(f"{question} {os.path.abspath(file)}".encode(errors="surrogateescape"))
-    kept = folder_for(None) / __version__ / "answers" / f"{place:08x}.json"
+    folder = user_cache_folder()
+    if folder is None:
+        return find()[0]
+    kept = folder / __version__ / "answers" / f"{place:08x}.json"
     with suppress(OsimliteError, ValueError, RecursionError):
         match json.loads(read_file(kept)):
             case [known, str(answer)] if known == key:
                 return answer
     answer, lasts = find()
     if lasts:
-        with suppress(OsimliteError, OSError):
-            kept.parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(kept, json.dumps([key, answer]))
+        write_cached(kept, json.dumps([key, answer]))
     return answer

@@ -175,7 +175,13 @@ def feedback(controller: Path | None, par: Path | None) -> Feedback | None:
 
 def results_folder(file: Path, output: Path | None) -> Path:
     """The folder that is asked for, else one in the current folder, named after the model's file."""
-    return output if output is not None else Path(file.stem)
+    from osimlite.writing import expect_folder_inside
+
+    if output is not None:
+        return output
+    # Nobody named it: a link of this name in a stranger's folder must not decide where results go.
+    expect_folder_inside(Path(file.stem))
+    return Path(file.stem)
 
 
 def named_words(words: Iterable[str] | None, option: str, form: str = "NAME=VALUE") -> dict[str, str]:

@@ -50,6 +50,16 @@ def run(
         ),
     ] = None,
     as_json: Annotated[bool, Option("--json", help="Print what became of each setup as JSON.")] = False,
+    overwrite: Annotated[
+        bool, Option("--overwrite", help="Let results replace any file, not only results of the same kind.")
+    ] = False,
+    write_outside: Annotated[
+        bool,
+        Option(
+            "--write-outside",
+            help="Let setups write outside of their project and of the current folder.",
+        ),
+    ] = False,
 ) -> None:
     """Run setup files of OpenSim's tools, and write the files that OpenSim would write.
 
@@ -58,6 +68,9 @@ def run(
 
     Of several setups each waits for those that make what it names; one that fails stops no other. What is done is noted
     until all are, and --resume goes on after Ctrl-C, a crash or an error. With -o each has a folder of its own in it.
+
+    A result replaces an existing file only if that is a result of the same kind. It is not written through a link, nor
+    under a hidden name, nor outside of the setup's project and the current folder. See --overwrite, --write-outside.
 
     With --report what a study of Moco finds is simulated, too, and it is told how far the motion stays with it.
 
@@ -80,7 +93,14 @@ def run(
             raise SettingError(f"--report would replace '{report}', which the results come from; give it another name")
         workers = 1
     if len(files) == 1 and not as_json and not (resume or cluster):
-        outcome = _run_alone(files[0], output, refine, simulates=report is not None)
+        outcome = _run_alone(
+            files[0],
+            output,
+            refine,
+            simulates=report is not None,
+            overwrite=overwrite,
+            write_outside=write_outside,
+        )
         _write_report({files[0]: outcome}, report)
         raise SystemExit(0 if outcome.done else 1)
     if refine is not None:
@@ -96,6 +116,8 @@ def run(
             resume=resume,
             progress=lambda done, of: progress(done, of),
             kept=kept,
+            overwrite=overwrite,
+            write_outside=write_outside,
         )
     if as_json:
         import json
@@ -116,7 +138,15 @@ def _codes(trials: list[Trial]) -> list[int]:
     return [{DONE: 0, NO: 1}.get(trial.status, 2) for trial in trials]
 
 
-def _run_alone(setup: Path, output: Path | None, refine: str | None, *, simulates: bool) -> Outcome:
+def _run_alone(
+    setup: Path,
+    output: Path | None,
+    refine: str | None,
+    *,
+    simulates: bool,
+    overwrite: bool,
+    write_outside: bool,
+) -> Outcome:
     """Run a setup, and say what came out."""
     from osimlite.cli._console import say
     from osimlite.lint.diagnostic import Report
@@ -131,6 +161,8 @@ def _run_alone(setup: Path, output: Path | None, refine: str | None, *, simulate
             progress=lambda line: say(line, err=True),
             refine=refine,
             simulates=simulates,
+            overwrite=overwrite,
+            write_outside=write_outside,
         )
     except FaultySetup as fault:
         _show_findings(Report(fault.report.errors, fault.report.texts))

@@ -12,7 +12,7 @@ import numpy as np
 
 from osimlite.document.printer import write
 from osimlite.errors import OsimliteError, SettingError, SimulationError
-from osimlite.files import folder_to_fill, write_atomically
+from osimlite.files import folder_to_fill, read_file, write_atomically
 from osimlite.gait.cycle_search import Candidate, CycleSearch, Found, Progress, along
 from osimlite.gait.stability import Improvement, cost
 from osimlite.gait.stepmap import TIGHT, refuse_constraints
@@ -146,8 +146,8 @@ def _spare(folder: Path, wanted: dict[str, Any]) -> None:
     """
     summary = folder / SUMMARY
     try:
-        before = dict(json.loads(summary.read_text(encoding="utf-8"))["settings"])
-    except (OSError, ValueError, LookupError, TypeError):
+        before = dict(json.loads(read_file(summary))["settings"])
+    except (OsimliteError, ValueError, LookupError, TypeError, RecursionError):
         refuse_overwrite(folder / name for name in (BEST, CYCLES, SUMMARY))
     else:
         refuse_others(summary, before, wanted)

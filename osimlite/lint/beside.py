@@ -7,7 +7,7 @@ from pathlib import Path
 
 from osimlite.document.kept import top_at, while_unchanged
 from osimlite.errors import OsimliteError
-from osimlite.files import read_file
+from osimlite.files import read_at_most, read_file
 from osimlite.lint.suffixes import DOCUMENTS, begins_as_ours
 from osimlite.lint.table import Table
 from osimlite.schema.model import Model
@@ -63,7 +63,6 @@ def documents_of(folder: str) -> list[str]:
 def beginning(file: str) -> bytes:
     """The first bytes of a file."""
     try:
-        with open(file, "rb") as stream:
-            return stream.read(2000)
-    except OSError:
+        return read_at_most(file, 2000)
+    except OsimliteError:
         return b""

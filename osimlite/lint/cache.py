@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from functools import cache
 from pathlib import Path
 from time import time_ns
@@ -20,15 +19,15 @@ from zlib import crc32
 from osimlite import __version__
 from osimlite._require import absent
 from osimlite.errors import OsimliteError
-from osimlite.files import read_file, stamped, write_atomically
+from osimlite.files import read_file, stamped
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Report, Severity
+from osimlite.writing import write_cached
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from osimlite.lint.config import Config
 
-NAME = ".osimlite_cache"
 Stamp = tuple[int, int] | None
 
 
@@ -79,8 +78,6 @@ class Cache:
         """
         place = self._entry(file)
         try:
-            # Making the folder changes the one around it, whose time may be noted.
-            self._prepare(place.parent)
             entry = {
                 "key": key,
                 "file": _stamp_since(file, since),
@@ -89,22 +86,14 @@ class Cache:
                 "findings": [_values(finding) for finding in report],
                 "unmeasured": report.unmeasured,
             }
-            write_atomically(place, json.dumps(entry, separators=(",", ":")))
         except (OSError, OsimliteError):
             return
+        write_cached(place, json.dumps(entry, separators=(",", ":")))
 
     def _entry(self, file: str) -> Path:
         # The key has the path too: of two files with the same sum, the one checked last is known.
         digest = f"{crc32(os.path.abspath(file).encode(errors='surrogateescape')):08x}"
         return self.folder / digest[:2] / f"{digest[2:]}.json"
-
-    def _prepare(self, folder: Path) -> None:
-        if folder.is_dir():
-            return
-        folder.mkdir(parents=True, exist_ok=True)
-        ignore = self.folder.parent / ".gitignore"
-        if self.folder.parent.name == NAME and not ignore.exists():
-            ignore.write_text("*\n", encoding="utf-8")
 
     def _stamp(self, path: str) -> Stamp:
         # Many models share their meshes.
@@ -115,17 +104,6 @@ class Cache:
             except (OSError, ValueError):
                 self._stamps[path] = None
         return self._stamps[path]
-
-
-def folder_for(settings_file: Path | None) -> Path:
-    """Where entries are kept: beside the settings of a project, else where programs of a user keep such things."""
-    if settings_file is not None:
-        return settings_file.parent / NAME
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home()) / "osimlite" / "cache"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "osimlite"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "osimlite"
 
 
 def key_of(file: str, config: Config) -> str:

@@ -13,11 +13,12 @@ from typing import NamedTuple
 from osimlite._cores import cores
 from osimlite.errors import MissingFileError
 from osimlite.files import read_standard_input
-from osimlite.lint.cache import Cache, folder_for, key_of, text_of
+from osimlite.lint.cache import Cache, key_of, text_of
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report, merged
 from osimlite.lint.settings import Settings, settings_for
 from osimlite.records import replace
+from osimlite.writing import user_cache_folder
 
 WORTH_SHARING = 4_000_000
 """Bytes of models from which on further processes are started; checking takes about a second for 15 MB."""
@@ -66,7 +67,7 @@ def check_files(
         if file == "-":
             result[file] = _standard_input(config, texts)
             continue
-        job = Job(file, config, folder_for(settings.file) if cached else None)
+        job = Job(file, config, user_cache_folder() if cached else None)
         known = None
         if job.kept_in is not None:
             kept = caches.setdefault(job.kept_in, Cache(job.kept_in))

@@ -11,9 +11,10 @@ from hashlib import blake2b
 from typing import TYPE_CHECKING, NamedTuple
 
 from osimlite.errors import OsimliteError
-from osimlite.files import read_file, write_atomically
+from osimlite.files import read_file
 from osimlite.lint.measures import Measures, of_owners
 from osimlite.schema.specs import lineage
+from osimlite.writing import write_cached
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -111,12 +112,7 @@ def remember(parts: Parts, measures: Measures, folder: Path | None) -> None:
         from pydantic import ConfigDict, TypeAdapter
 
         adapter = TypeAdapter(Known, config=ConfigDict(ser_json_inf_nan="constants"))
-        file = _file(folder, parts)
-        try:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(file, adapter.dump_json(known))
-        except (OSError, OsimliteError):
-            return
+        write_cached(_file(folder, parts), adapter.dump_json(known))
 
 
 def _file(folder: Path, parts: Parts) -> Path:

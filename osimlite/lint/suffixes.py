@@ -8,7 +8,7 @@ from pathlib import Path
 
 from osimlite.errors import OsimliteError
 from osimlite.files import TABLES as TABLES
-from osimlite.files import no_such, unsaved
+from osimlite.files import no_such, read_at_most, unsaved
 from osimlite.lint.ours import BEGINNING, is_ours
 
 DOCUMENTS = (".xml", ".omoco")
@@ -71,7 +71,6 @@ def begins_as_ours(file: str) -> bool:
     if not file.lower().endswith(".xml"):
         return True
     try:
-        with open(file, "rb") as stream:
-            return is_ours(stream.read(BEGINNING))
-    except OSError:
+        return is_ours(read_at_most(file, BEGINNING))
+    except OsimliteError:
         return True

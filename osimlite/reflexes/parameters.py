@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from osimlite.errors import DocumentError, MissingFileError
+from osimlite.errors import DocumentError
+from osimlite.files import read_file
 from osimlite.multibody.spatial import Array
-from osimlite.reflexes.settings import Node
+from osimlite.reflexes.settings import Node, as_finite
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _FORM = re.compile(rf"(?P<mean>{_NUMBER})?(?:~(?P<std>{_NUMBER})?)?(?:<(?P<low>{_NUMBER}),(?P<high>{_NUMBER})>)?$")
@@ -114,16 +115,17 @@ def read_par(path: str | Path) -> dict[str, tuple[float, float, float]]:
         DocumentError: a line has no name and three numbers.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise MissingFileError("no such file", file=str(path)) from None
+        text = read_file(path).decode()
+    except UnicodeDecodeError as error:
+        message = f"the file is not UTF-8: byte {error.start + 1} is {error.object[error.start]:#04x}"
+        raise DocumentError(message, file=str(path)) from None
     result = {}
     for number, line in enumerate(text.splitlines(), 1):
         words = line.split()
         if not words:
             continue
         try:
-            best, mean, std = (float(word) for word in words[1:4])
+            best, mean, std = (as_finite(word) for word in words[1:4])
         except ValueError:
             raise DocumentError(
                 "a name, best, mean and standard deviation are wanted", file=str(path), line=number

@@ -38,6 +38,12 @@ HIGH, CLOSE, TRIES = 10.0, 0.1, 100
 """How far a walker is lifted or lowered at most to carry its weight (m), how well it has to carry it, and tries."""
 LIFT = 0.1
 """M, by which it is lifted at a time."""
+MAX_POPULATION = 10_000
+"""Candidates of a generation: each has a state and a record of its own."""
+MAX_SEED = 2**32 - 2
+"""The largest seed that numpy takes, less the one that CMA-ES adds."""
+MAX_STEPS = 2_000_000
+"""Control steps of a walk: each is recorded."""
 SHORTEST = 1e-4
 """S, of a control step: each is recorded."""
 AT_ONCE = 100
@@ -116,9 +122,9 @@ class Scenario:
             raise objective.error(f"a walk of {self.duration:g} s is shorter than a control step of {self.step:g} s")
         self.begun = begun(self.optimizer, self.folder)
         if found is not None:
-            self.population = int(self.optimizer.number("lambda", POPULATION))
-            self.generations = int(self.optimizer.number("max_generations", GENERATIONS))
-            self.seed = int(self.optimizer.number("random_seed", 0))
+            self.population = self.optimizer.count("lambda", POPULATION, 1, MAX_POPULATION)
+            self.generations = self.optimizer.count("max_generations", GENERATIONS, 0, 10**9)
+            self.seed = self.optimizer.count("random_seed", 0, 0, MAX_SEED)
             for key in LEFT_ASIDE:
                 self.optimizer.get(key)
             self.optimizer.expect_all_asked(f"a {found[0]}")
@@ -180,11 +186,15 @@ class Scenario:
         """
         if duration is not None and not duration >= self.step:
             raise SettingError(f"a walk of {duration:g} s is shorter than a control step of {self.step:g} s")
+        length = self.duration if duration is None else duration
+        if not length <= MAX_STEPS * self.step:
+            message = f"a walk of {length:g} s has more than {MAX_STEPS} control steps of {self.step:g} s"
+            raise SettingError(message)
         parameters = Parameters(values, count)
         for name, value in values.items():
             if np.shape(value) not in ((), (count,)):
                 raise SettingError(f"'{name}' has {np.size(value)} values for {count} candidates")
-        candidates = Candidates(self, parameters, self.duration if duration is None else duration)
+        candidates = Candidates(self, parameters, length)
         for name in values:
             if name not in parameters.found and name not in self.begun:
                 raise SettingError(f"the scenario has no parameter '{name}'{or_known(name, parameters.found)}")

@@ -5,6 +5,8 @@ In YAML and Python a key that stands several times has a list of what stands bel
 
 from __future__ import annotations
 
+import math
+import os
 import re
 from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
@@ -15,15 +17,24 @@ import numpy as np
 
 from osimlite.document.data import SUFFIXES, parsed_yaml
 from osimlite.errors import DocumentError, MissingFileError
+from osimlite.files import read_file
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass, field
-from osimlite.text import did_you_mean
+from osimlite.text import did_you_mean, listed
+from osimlite.writing import shared_folders
 
 _TOKEN = re.compile(r'\s+|#[^\n]*|(?P<token>"[^"]*"|<<|>>|[{}=\[\]]|[^\s{}=\[\]#"]+)')
 FLAGS = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
-_MOST_DEEP = 20
-"""Files that may include one another."""
-
+MAX_INCLUDE_DEPTH = 20
+"""Files that may include one another in a chain."""
+MAX_INCLUDED_FILES = 200
+"""Files that one scenario reads: a file that includes the next twice doubles their number each time."""
+MAX_PARTS = 200_000
+"""Parts of all files together, with those that stand there again because a file is included again."""
+MAX_NESTING = 100
+"""Levels of braces; SCONE's own scenarios have about ten."""
+INCLUDED_ENDINGS = (".scone", ".zml", *SUFFIXES)
+"""Endings of files that a scenario may include; errors would show the first words of any other file."""
 
 CALLED = "name", "signature", "signature_prefix", "signature_postfix"
 """How any part is called, and the folder of its results in SCONE; nothing else depends on these."""
@@ -82,9 +93,30 @@ class Node:
             return otherwise
         text = self.text(key)
         try:
-            return float(text)
+            number = float(text)
         except ValueError:
-            raise (found or self).error(f"'{key}' must be a number, not '{text}'") from None
+            number = math.nan
+        if math.isnan(number):
+            raise (found or self).error(f"'{key}' must be a number, not '{text}'")
+        return number
+
+    def count(self, key: str, default: int, least: int, most: int) -> int:
+        """Return the whole number of a part.
+
+        Args:
+            key: name of the part.
+            default: if there is no such part.
+            least, most: limits of what makes sense.
+
+        Raises:
+            DocumentError: it is no whole number, or beyond the limits.
+        """
+        number = self.number(key, default)
+        if not least <= number <= most or number != int(number):
+            raise (self.get(key) or self).error(
+                f"'{key}' must be a whole number from {least} to {most}, not '{self.text(key)}'"
+            )
+        return int(number)
 
     def flag(self, key: str, otherwise: bool) -> bool:
         """Whether a part is 1 or true.
@@ -105,7 +137,7 @@ class Node:
         """
         text = self.text(key, otherwise)
         try:
-            x, y, z = map(float, text.split())
+            x, y, z = map(as_finite, text.split())
         except ValueError:
             raise (self.get(key) or self).error(f"'{key}' must be three numbers, as [ 0 0 1 ], not '{text}'") from None
         return np.array([x, y, z])
@@ -142,6 +174,35 @@ class Node:
                 raise node.error(f"'{name}' of {what} is not done here{near}")
 
 
+def as_finite(word: str) -> float:
+    """Return the number that a word is; ValueError if it is none, infinite or NaN."""
+    number = float(word)
+    if not math.isfinite(number):
+        raise ValueError(f"{word} is not finite")
+    return number
+
+
+@dataclass
+class _Budget:
+    """What reading one scenario may still take, with all files that it includes."""
+
+    files: int = MAX_INCLUDED_FILES
+    parts: int = MAX_PARTS
+
+    def take_file(self, path: Path) -> None:
+        self.files -= 1
+        if self.files < 0:
+            raise DocumentError(
+                f"the files include more than {MAX_INCLUDED_FILES} others, some of them again and again",
+                file=str(path),
+            )
+
+    def take_part(self, node: Node) -> None:
+        self.parts -= 1
+        if self.parts < 0:
+            raise node.error(f"the scenario has more than {MAX_PARTS} parts with all that it includes")
+
+
 def read_settings(path: str | Path) -> Node:
     """Read a file, and those that it includes, which are looked for beside it and in its folders above.
 
@@ -151,7 +212,7 @@ def read_settings(path: str | Path) -> Node:
         DocumentError: one is damaged; with its line.
     """
     constants: dict[str, str] = {}
-    return _read(Path(path), Path(path).parent, constants, 0)
+    return _read(Path(path), Path(path).parent, constants, 0, _Budget())
 
 
 def settings_of(data: Mapping[str, Any]) -> Node:
@@ -169,20 +230,20 @@ def _parts_of(key: str, value: Any) -> Iterator[tuple[str, Node]]:
         yield key, Node(" ".join(map(str, value)) if isinstance(value, list | tuple) else str(value))
 
 
-def _read(path: Path, base: Path, constants: dict[str, str], depth: int) -> Node:
+def _read(path: Path, base: Path, constants: dict[str, str], depth: int, budget: _Budget) -> Node:
+    budget.take_file(path)
     try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise MissingFileError("no such file", file=str(path)) from None
-    except (OSError, UnicodeError) as error:
-        raise DocumentError(f"cannot be read: {error}", file=str(path)) from None
-    if depth > _MOST_DEEP:
+        text = read_file(path).decode()
+    except UnicodeDecodeError as error:
+        message = f"the file is not UTF-8: byte {error.start + 1} is {error.object[error.start]:#04x}"
+        raise DocumentError(message, file=str(path)) from None
+    if depth > MAX_INCLUDE_DEPTH:
         raise DocumentError("the files include one another without end", file=str(path))
     if path.suffix in SUFFIXES:
         top = Node(file=str(path), line=1)
         found = parsed_yaml(text, str(path), with_lines=True)
         if found is not None:
-            _fill_from_yaml(top, found, path, base, depth)
+            _fill_from_yaml(top, found, path, base, depth, 0, budget)
         return top
     tokens = []
     line = 1
@@ -197,21 +258,31 @@ def _read(path: Path, base: Path, constants: dict[str, str], depth: int) -> Node
             tokens.append((found["token"], line))
         line += found.group().count("\n")
         place = found.end()
-    reader = _Reader(tokens, path, base, constants, depth)
+    reader = _Reader(tokens, path, base, constants, depth, budget)
     top = Node(file=str(path), line=1)
-    reader.fill(top)
+    reader.fill(top, 0)
     if reader.place < len(tokens):
         raise top.error(f"line {tokens[reader.place][1]}: a '}}' without its '{{'")
     return top
 
 
-def _fill_from_yaml(node: Node, found: Any, path: Path, base: Path, depth: int) -> None:
+def _fill_from_yaml(node: Node, found: Any, path: Path, base: Path, depth: int, level: int, budget: _Budget) -> None:
     """Put below a node what a mapping of YAML has."""
     if found.id != "mapping":
         raise node.error("keys with values are wanted")
+    # An anchor that contains an alias of itself has no end.
+    if level > MAX_NESTING:
+        raise node.error(f"the parts nest more than {MAX_NESTING} levels deep")
     for key, value in found.value:
+        if key.id != "scalar":
+            raise node.error("a key must be a word")
         if key.value == "include":
-            node.parts += _read(found_file(value.value, path.parent, base), base, {}, depth + 1).parts
+            if value.id != "scalar":
+                raise DocumentError(
+                    "'include' must be the name of one file", file=node.file, line=value.start_mark.line + 1
+                )
+            included = _included_file(value.value, path, base)
+            node.parts += _read(included, base, {}, depth + 1, budget).parts
             continue
         several = value.value if value.id == "sequence" else [value]
         if value.id == "sequence" and all(item.id == "scalar" for item in several):
@@ -219,26 +290,27 @@ def _fill_from_yaml(node: Node, found: Any, path: Path, base: Path, depth: int) 
             node.parts.append((key.value, Node(words, file=node.file, line=value.start_mark.line + 1)))
             continue
         for item in several:
+            budget.take_part(node)
             part = Node(file=node.file, line=item.start_mark.line + 1)
             node.parts.append((key.value, part))
             if item.id == "scalar":
                 part.value = item.value
             else:
-                _fill_from_yaml(part, item, path, base, depth)
+                _fill_from_yaml(part, item, path, base, depth, level + 1, budget)
 
 
 class _Reader:
     def __init__(
-        self, tokens: list[tuple[str, int]], path: Path, base: Path, constants: dict[str, str], depth: int
+        self,
+        tokens: list[tuple[str, int]],
+        path: Path,
+        base: Path,
+        constants: dict[str, str],
+        depth: int,
+        budget: _Budget,
     ) -> None:
-        self.tokens, self.path, self.base, self.constants, self.depth, self.place = (
-            tokens,
-            path,
-            base,
-            constants,
-            depth,
-            0,
-        )
+        self.tokens, self.path, self.base, self.constants = tokens, path, base, constants
+        self.depth, self.budget, self.place = depth, budget, 0
 
     def next(self) -> str:
         if self.place >= len(self.tokens):
@@ -249,7 +321,9 @@ class _Reader:
     def line(self) -> int:
         return self.tokens[min(self.place, len(self.tokens)) - 1][1] if self.tokens else 1
 
-    def fill(self, node: Node) -> None:
+    def fill(self, node: Node, level: int) -> None:
+        if level > MAX_NESTING:
+            raise node.error(f"the braces nest more than {MAX_NESTING} levels deep")
         while self.place < len(self.tokens) and self.tokens[self.place][0] != "}":
             key = self.next()
             if key == "<<":
@@ -258,6 +332,7 @@ class _Reader:
                     words.append(word.strip('"'))
                 node.parts += self._included(" ".join(words)).parts
                 continue
+            self.budget.take_part(node)
             part = Node(file=str(self.path), line=self.line())
             what = self.next() if self.place < len(self.tokens) else ""
             if what == "=":
@@ -265,7 +340,7 @@ class _Reader:
                 if self.place < len(self.tokens) and self.tokens[self.place][0] == "{":
                     what = self.next()
             if what == "{":
-                self.fill(part)
+                self.fill(part, level + 1)
                 if self.next() != "}":
                     raise part.error(f"'{key}' has no end")
             elif what != "=":
@@ -292,12 +367,42 @@ class _Reader:
         return value.strip('"')
 
     def _included(self, name: str) -> Node:
-        return _read(found_file(name, self.path.parent, self.base), self.base, self.constants, self.depth + 1)
+        included = _included_file(name, self.path, self.base)
+        return _read(included, self.base, self.constants, self.depth + 1, self.budget)
 
 
 def matches(name: str, patterns: str) -> bool:
     """Whether a name fits one of some patterns, between which there are semicolons."""
     return any(fnmatchcase(name, pattern) for pattern in patterns.split(";") if pattern)
+
+
+def _included_file(name: str, path: Path, base: Path) -> Path:
+    """Return the file that `path` includes.
+
+    Errors in it quote its words, so that it must not be any file of the user: it has an ending of
+    settings, is in the folders of the scenario, and is not hidden; the same holds of what a link
+    leads to.
+
+    Raises:
+        MissingFileError: there is no such file.
+        DocumentError: it may not be included.
+    """
+    found = found_file(name, path.parent, base)
+    real = found.resolve()
+    if not {found.suffix.lower(), real.suffix.lower()} <= {*INCLUDED_ENDINGS}:
+        endings = listed(INCLUDED_ENDINGS)
+        message = f"'{name}' is not included: the name of the file must end in {endings}"
+        raise DocumentError(message, file=str(path))
+    top = base.resolve()
+    shared = shared_folders()
+    for folder in top.parents[:3]:
+        if str(folder) in shared:
+            break
+        top = folder
+    if not real.is_relative_to(top) or any(part[0] == "." for part in real.relative_to(top).parts):
+        message = f"'{name}' is not included: it is hidden, or outside of '{top}'"
+        raise DocumentError(message, file=str(path))
+    return found
 
 
 def found_file(name: str, *folders: Path) -> Path:
@@ -308,6 +413,6 @@ def found_file(name: str, *folders: Path) -> Path:
     """
     for folder in folders:
         for place in (folder, *folder.resolve().parents[:3]):
-            if (place / name).is_file():
+            if os.path.isfile(place / name):
                 return place / name
     raise MissingFileError("no such file", file=str(folders[0] / name))

@@ -15,7 +15,7 @@ from osimlite._lazy import shown_in_notebooks
 from osimlite._require import require
 from osimlite.document.printer import write
 from osimlite.errors import OsimliteError, SettingError, SimulationError
-from osimlite.files import folder_to_fill, write_atomically
+from osimlite.files import folder_to_fill, open_file, read_file, write_atomically
 from osimlite.records import dataclass, replace
 from osimlite.sweep import registry
 from osimlite.sweep.measures import measure_name
@@ -206,8 +206,8 @@ def found_by(folder: str | Path) -> dict[str, float]:
     """
     path = Path(folder) / SUMMARY
     try:
-        return {name: float(value) for name, value in json.loads(path.read_text(encoding="utf-8"))["values"].items()}
-    except (OSError, ValueError, LookupError, AttributeError, TypeError):
+        return {name: float(value) for name, value in json.loads(read_file(path))["values"].items()}
+    except (OsimliteError, ValueError, LookupError, AttributeError, TypeError, RecursionError):
         raise OsimliteError(f"'{path}' is not the summary of a search; name the folder of one") from None
 
 
@@ -216,7 +216,7 @@ def _open(path: Path, table: Any, resume: bool, force: bool, evaluations: _Evalu
     if path.is_file() and not force and not (resume and partial_of(path).exists()):
         spare(path, json.loads(table.metadata[KEY]))
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
-        with damage_told(path), open(path, "rb") as stream:
+        with damage_told(path), open_file(path) as stream:
             # A program that ends while pyarrow's threads do is killed by their C++ now and then.
             before = pq.ParquetFile(stream, page_checksum_verification=True).read(use_threads=False)
         if resume:

@@ -21,9 +21,10 @@ import numpy as np
 
 from osimlite._require import require
 from osimlite.errors import OsimliteError, SettingError
-from osimlite.files import no_such, put_in_place
+from osimlite.files import no_such, open_file, put_in_place
 from osimlite.simulation.interrupts import defer_sigint
 from osimlite.text import counted, listed
+from osimlite.writing import open_to_append
 
 KEY = b"osimlite"
 """Where the settings are in the metadata of the schema, as JSON."""
@@ -61,7 +62,7 @@ def settings_of(path: str | Path) -> dict[str, Any]:
         raise no_such(path)
     try:
         # By the stream: of a name, pyarrow thinks that what is before a colon is a protocol, and that all is UTF-8.
-        with open(path, "rb") as stream:
+        with open_file(path) as stream:
             return _settings_in(pq.read_schema(stream))
     except (ValueError, OSError):
         raise OsimliteError("this file is not the results of a sweep; give them another name", file=str(path)) from None
@@ -157,7 +158,7 @@ class Partial:
         try:
             self._lock = _locked(self.partial)
             try:
-                self._stream = self.partial.open("ab")
+                self._stream = open_to_append(self.partial)
                 if is_there:
                     self._reopen()
                 else:
@@ -310,7 +311,7 @@ def _locked(path: Path) -> Any:
 
 def _records(path: Path) -> Iterator[tuple[bytes, int]]:
     """The records of a partial file as far as they are whole, and where each ends."""
-    with path.open("rb") as stream:
+    with open_file(path) as stream:
         while len(head := stream.read(_HEAD.size)) == _HEAD.size:
             mark, length, checksum = _HEAD.unpack(head)
             # A damaged length may be that of no memory.
@@ -351,7 +352,7 @@ class ResultTable:
             OsimliteError: the file is damaged.
         """
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
-        with damage_told(self._results()), open(self._results(), "rb") as stream:
+        with damage_told(self._results()), open_file(self._results()) as stream:
             return pq.read_table(stream)
 
     def to_frame(self) -> Any:
@@ -392,7 +393,7 @@ def ranges(path: str | Path, names: Sequence[str]) -> dict[str, Range]:
     counts = dict.fromkeys(names, 0)
     with (
         damage_told(path),
-        open(path, "rb") as stream,
+        open_file(path) as stream,
         pq.ParquetFile(stream, page_checksum_verification=True) as file,
     ):
         for batch in file.iter_batches(columns=["run", *names]):

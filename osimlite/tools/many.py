@@ -8,21 +8,23 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
-from glob import glob, has_magic
+from glob import has_magic
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
 from osimlite.document.kept import top_at
 from osimlite.errors import OsimliteError
-from osimlite.files import write_atomically
+from osimlite.files import read_file
 from osimlite.records import dataclass, field
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Set
 from osimlite.text import counted, listed
 from osimlite.tools.named_files import named_files
 from osimlite.tools.outcome import Outcome
+from osimlite.tools.patterns import find_files
 from osimlite.tools.running import run, runnable
+from osimlite.writing import write_into
 
 JOURNAL = ".osimlite-run.jsonl"
 """Where it is noted which setups are done, until all are: in the folder of the results, or where the program runs."""
@@ -66,7 +68,7 @@ def found(words: Iterable[str | Path]) -> list[Path]:
     files: dict[Path, None] = {}
     for word in map(str, words):
         if has_magic(word) and not os.path.exists(word):
-            matches = sorted(filter(os.path.isfile, glob(word, recursive=True)))
+            matches = find_files(word)
             setups = [Path(match) for match in matches if not isinstance(top_at(match), Model | Set)]
             if not setups:
                 raise OsimliteError(f"no {'setup' if matches else 'file'} matches '{word}'")
@@ -89,6 +91,8 @@ def run_many(
     resume: bool = False,
     progress: Callable[[int, int], object] | None = None,
     kept: dict[str | Path, Outcome] | None = None,
+    overwrite: bool = False,
+    write_outside: bool = False,
 ) -> list[Trial]:
     """Run setups; one that fails stops none but those that need what it makes.
 
@@ -103,6 +107,8 @@ def run_many(
         resume: leave out what an earlier run has done, if its inputs and its results are still there unchanged.
         progress: called with how many are done, and of how many.
         kept: is given what came out of each setup; with one worker, in this process, only.
+        overwrite: whether any file may be replaced; without it only results of the same kind are.
+        write_outside: whether setups may name results outside of their project and the current folder.
 
     Returns:
         What became of each, in their order.
@@ -114,7 +120,7 @@ def run_many(
     journal = _Journal(output or Path(), resume, is_kept=len(setups) > 1)
     places = places_of(setups, output)
     work = _Work(setups, journal, progress, apart=output is not None)
-    do = partial(_one, places, kept)
+    do = partial(_one, places, kept, overwrite, write_outside)
     try:
         if cluster is None and workers == 1:
             for setup in work.ready():
@@ -155,12 +161,18 @@ def places_of(setups: Sequence[Path], output: Path | None) -> dict[Path, Path | 
     }
 
 
-def _one(places: dict[Path, Path | None], kept: dict[str | Path, Outcome] | None, setup: Path) -> Trial:
+def _one(
+    places: dict[Path, Path | None],
+    kept: dict[str | Path, Outcome] | None,
+    overwrite: bool,
+    write_outside: bool,
+    setup: Path,
+) -> Trial:
     """Run one setup; every error of its own is part of the answer."""
     started = time.perf_counter()
-    digest = digest_of(setup)
     try:
-        outcome = run(setup, places[setup])
+        digest = digest_of(setup)
+        outcome = run(setup, places[setup], overwrite=overwrite, write_outside=write_outside)
     except OsimliteError as error:
         return Trial(str(setup), FAILED, message=str(error), seconds=time.perf_counter() - started)
     if kept is not None:
@@ -187,8 +199,8 @@ def digest_of(setup: Path) -> str:
     for path in dict.fromkeys((str(setup), *named_files(str(setup), "file"))):
         made.update(path.encode("utf-8", "surrogateescape"))
         try:
-            made.update(Path(path).read_bytes())
-        except OSError:
+            made.update(read_file(path))
+        except OsimliteError:
             made.update(b"\0")
     return made.hexdigest()
 
@@ -199,12 +211,13 @@ class _Journal:
     def __init__(self, folder: Path, resume: bool, *, is_kept: bool) -> None:
         self.path, self.noted = folder / JOURNAL, dict[str, Trial]()
         self._saved, self._is_kept = time.monotonic(), is_kept
-        if resume and self.path.is_file():
-            for line in self.path.read_bytes().splitlines():
-                # What is damaged is done again.
-                with suppress(ValueError, TypeError):
-                    trial = Trial(**json.loads(line))
-                    self.noted[trial.setup] = trial
+        lines: list[bytes] = []
+        # A journal that cannot be read, or is no file, is none; the work is done again.
+        with suppress(OsimliteError):
+            lines = read_file(self.path).splitlines() if resume else []
+        for line in lines:
+            if (trial := _read_trial(line)) is not None:
+                self.noted[trial.setup] = trial
 
     def done(self, setup: Path) -> Trial | None:
         """What is noted of a setup, if all is still as it was."""
@@ -228,7 +241,7 @@ class _Journal:
         self._saved = time.monotonic()
         if self._is_kept and self.noted and self.path.parent.is_dir():
             lines = (json.dumps({**vars(trial), "was_done": False}) for trial in self.noted.values())
-            write_atomically(self.path, "".join(f"{line}\n" for line in lines))
+            write_into(self.path.parent, self.path.name, "".join(f"{line}\n" for line in lines))
 
     def end(self, trials: Sequence[Trial]) -> None:
         """Nothing is left to do, or something that failed may be done later."""
@@ -237,6 +250,33 @@ class _Journal:
                 self.path.unlink(missing_ok=True)
             else:
                 self.save()
+
+
+def _read_trial(line: bytes) -> Trial | None:
+    """Return the trial of one line of a journal; None if the line is damaged, so that it is done again."""
+    try:
+        match json.loads(line):
+            case {
+                "setup": str(),
+                "status": str(status),
+                "told": [*told],
+                "summary": {**_summary},
+                "files": [*files],
+                "message": str(),
+                "warnings": [*warnings],
+                "seconds": int() | float(),
+                "digest": str(),
+                "was_done": bool(),
+            } as values if status in STATUSES:
+                pairs = [(name, said) for name, said in told]
+                words = (*files, *warnings, *(word for pair in pairs for word in pair))
+                # Tables of many trials are sorted by this number.
+                error = values["summary"].get("rms_marker_error", 0.0)
+                if isinstance(error, int | float) and all(isinstance(word, str) for word in words):
+                    return Trial(**{**values, "told": pairs})
+    except (ValueError, TypeError, RecursionError):
+        pass
+    return None
 
 
 class _Work:

@@ -1,35 +1,70 @@
-"""The files that a setup names, with those that the documents named in it name."""
+"""Return the files that a setup names, with those that the documents named in it name."""
 
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from osimlite.errors import DocumentError
 from osimlite.lint.config import Config
 from osimlite.lint.engine import subject_of
 from osimlite.lint.setup import Setup
 
+MAX_DOCUMENTS = 500
+"""Documents that one setup may name, directly or through others. Real setups name about ten."""
 
-def named_files(setup: str, rule: str, passed: frozenset[str] = frozenset()) -> Iterator[str]:
-    """Files that a setup, and the documents that it names, names by a rule of names: ``file``, ``output-file``."""
-    subject = subject_of(setup, Config())
-    if not isinstance(subject, Setup):
-        return
-    for item in subject.named_files(rule):
-        if rule == "file":
-            yield item.path
-        else:
-            folder = os.path.dirname(setup)
-            yield os.path.join(folder, item.name.strip())
-            yield os.path.join(folder, str(getattr(subject.top, "results_directory", "")).strip(), item.name.strip())
-    for item in subject.named_files("file"):
-        if item.path.lower().endswith(".xml") and item.path not in passed and os.path.isfile(item.path):
-            yield from named_files(item.path, rule, passed | {setup})
+
+def named_files(setup: str, rule: str) -> Iterator[str]:
+    """Yield files that a setup, and the documents that it names, name by a rule of names.
+
+    Each document is read once, however often and by whomever it is named: setups that name each
+    other would otherwise be read again along every path between them.
+
+    Args:
+        setup: path of the document.
+        rule: ``file`` for inputs, ``output-file`` for results.
+
+    Raises:
+        DocumentError: more than `MAX_DOCUMENTS` documents are named.
+    """
+    visited = {os.path.realpath(setup)}
+    waiting = deque([setup])
+    while waiting:
+        file = waiting.popleft()
+        subject = subject_of(file, Config())
+        if not isinstance(subject, Setup):
+            continue
+        for item in subject.named_files(rule):
+            if rule == "file":
+                yield item.path
+            else:
+                folder = os.path.dirname(file)
+                results = str(getattr(subject.top, "results_directory", "")).strip()
+                yield os.path.join(folder, item.name.strip())
+                yield os.path.join(folder, results, item.name.strip())
+        for item in subject.named_files("file"):
+            real = os.path.realpath(item.path)
+            if item.path.lower().endswith(".xml") and real not in visited and os.path.isfile(real):
+                visited.add(real)
+                expect_few(visited, setup)
+                waiting.append(item.path)
+
+
+def expect_few(documents: set[str], setup: str) -> None:
+    """Refuse more documents than a setup may name.
+
+    Raises:
+        DocumentError: there are more than `MAX_DOCUMENTS`.
+    """
+    if len(documents) > MAX_DOCUMENTS:
+        message = f"it names more than {MAX_DOCUMENTS} documents, with those that they name"
+        raise DocumentError(message, file=setup)
 
 
 def inputs_among(paths: Iterable[Path], setup: Path) -> list[Path]:
-    """Those of some files that are a setup or one that it takes something from, by whatever name or link."""
+    """Return those of some files that are a setup or one of its inputs, by whatever name or link."""
     there = [path for path in paths if os.path.isfile(path)]
     names = (str(setup), *named_files(str(setup), "file")) if there else ()
     inputs = [name for name in dict.fromkeys(names) if os.path.isfile(name)]

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import DocumentError, SettingError, SimulationError
-from osimlite.files import make_folder, written_atomically
 from osimlite.lint.diagnostic import Finding
 from osimlite.records import dataclass, field, replace
 from osimlite.simulation.files.old_storage import PRECISION, printed
 from osimlite.simulation.files.storage import StoTable, adapter_lines
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.named_files import inputs_among
+from osimlite.writing import ResultWriter
 
 MOST_DIGITS = 1074
 """Behind the point of a number, of which the last is no zero."""
@@ -93,11 +93,12 @@ class Outcome:
             message = f"a result would replace '{path}', which it is computed from; give it another name or place"
             raise DocumentError(message, file=str(setup))
 
-    def write(self, setup: Path) -> None:
+    def write(self, setup: Path, writer: ResultWriter) -> None:
         """Write what is still to be written, all files whole or none of them.
 
         Args:
             setup: that all comes from.
+            writer: decides which files may be written.
 
         Raises:
             OsimliteError: a file cannot be written or is one of the setup's own, or results are no numbers any more;
@@ -106,11 +107,11 @@ class Outcome:
         self._require_numbers()
         self._require_inputs_kept(setup)
         with ExitStack() as all_or_none:
+            # All names are checked before the first folder is made.
+            for path in self._texts:
+                writer.resolve(path)
             # They are put in their places in the end, the last first: of one place the last one stays.
             for path, lines in reversed(self._texts.items()):
-                make_folder(path.parent)
-                stream = all_or_none.enter_context(written_atomically(path))
-                stream.writelines(line.encode() for line in lines)
-                stream.close()
+                all_or_none.enter_context(writer.written(path, lines))
         self.files += self._texts
         self._texts.clear()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
@@ -23,7 +24,9 @@ from osimlite.multibody.extremes import any_numbers
 from osimlite.schema.registry import MODULES
 from osimlite.text import counted, listed
 from osimlite.tools.job import Job, NotRunnable
+from osimlite.tools.named_files import expect_few
 from osimlite.tools.outcome import Outcome
+from osimlite.writing import ResultWriter
 
 IGNORED = ("OSIM101",)
 """Errors that OpenSim runs a setup with: properties that it does not know, such as those of other versions. A study of
@@ -57,6 +60,8 @@ def run(
     progress: Callable[[str], None] | None = None,
     refine: float | str | None = None,
     simulates: bool = False,
+    overwrite: bool = False,
+    write_outside: bool = False,
 ) -> Outcome:
     """Run the setup of a tool as OpenSim would, and write the files that it would write.
 
@@ -71,6 +76,8 @@ def run(
             :func:`osimlite.moco.solve`.
         simulates: of optimal control, whether the model is also simulated with the controls that were found, and it is
             told how far that is from what was found.
+        overwrite: whether any file may be replaced; without it only results of the same kind are.
+        write_outside: whether the setup may name results outside of its project and the current folder.
 
     Returns:
         The tables that were written, as they were before they were rounded to the digits of the files, and a summary.
@@ -102,9 +109,10 @@ def run(
         if tell is not None and misspelt:
             tell(Report(misspelt, report.texts))
     tool = import_module(f"{__package__}.{module_name(tag)}")
+    writer = ResultWriter.for_document(file, output, overwrite=overwrite, outside=write_outside)
     try:
         tool.run(Job(top, file, None if output is None else Path(output), refine, simulates), outcome)
-        outcome.write(file)
+        outcome.write(file, writer)
     except OsimliteError as error:
         error.file = error.file or str(file)
         subject = subject_of(str(file), Config()) if isinstance(error, MissingFileError) else None
@@ -125,19 +133,29 @@ def _is_there(tag: str) -> bool:
     return of_tools and find_spec(f"{__package__}.{module_name(tag)}") is not None
 
 
-def _reports(file: str, away: dict[str, None], passed: frozenset[str] = frozenset()) -> Iterator[Report]:
-    """What is wrong with a document and with the documents and tables that it names; models are left out.
+def _reports(setup: str, away: dict[str, None]) -> Iterator[Report]:
+    """Yield what is wrong with a document and with those and the tables that it names, each once, but not models.
 
     Files that are in the current folder, and not in that of the document that names them, are noted in `away`.
     """
-    subject = subject_of(file, settings_of(file).config_for(file, Config()))
-    yield checked(subject, measure=False)
-    if isinstance(subject, Setup):
+    waiting, visited = deque([setup]), {os.path.realpath(setup)}
+    while waiting:
+        file = waiting.popleft()
+        subject = subject_of(file, settings_of(file).config_for(file, Config()))
+        yield checked(subject, measure=False)
+        if not isinstance(subject, Setup):
+            continue
+        named: list[str] = []
         for naming in subject.named_files("file"):
             path = naming.path
             if not os.path.isfile(path):
                 continue
             if path == naming.name.strip() and not os.path.isabs(path):
                 away[path] = None
-            if path not in passed and (is_table(path) or path.lower().endswith(".xml")):
-                yield from _reports(path, away, passed | {file})
+            real = os.path.realpath(path)
+            if real not in visited and (is_table(path) or path.lower().endswith(".xml")):
+                visited.add(real)
+                expect_few(visited, setup)
+                named.append(path)
+        # What a document names is reported before what its neighbours name.
+        waiting.extendleft(reversed(named))

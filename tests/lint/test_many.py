@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import sys
 import time
 from pathlib import Path
 
@@ -13,9 +14,10 @@ import pytest
 from osimlite.errors import MissingFileError
 from osimlite.lint import Config, validate
 from osimlite.lint import many as module
-from osimlite.lint.cache import NAME, _code, folder_for
+from osimlite.lint.cache import _code
 from osimlite.lint.many import Texts, check_files, settings_of
 from osimlite.lint.ours import is_ours
+from osimlite.writing import user_cache_folder
 
 MESH = """\
 <OpenSimDocument Version="40600">
@@ -67,7 +69,7 @@ def test_an_unchanged_file_is_not_checked_again(project, checked):
     assert [finding.fix for finding in again] == [finding.fix for finding in first]
     assert any(finding.fix for finding in again)
     assert again.texts[str(project / "m.osim")] == MESH
-    assert (project / NAME / ".gitignore").read_text() == "*\n"
+    assert not list(project.glob(".*"))
 
 
 def test_another_text_or_configuration_is_checked(project, checked):
@@ -93,10 +95,10 @@ def test_a_file_whose_stamp_has_not_changed_is_not_read_again(project, checked, 
     assert codes(project) == first and len(checked) == 1
 
 
-def test_a_file_that_was_touched_is_read_again_and_not_checked(project, checked):
+def test_a_file_that_was_touched_is_read_again_and_not_checked(project, checked, findings_cache):
     first = codes(project)
     (project / "m.osim").write_text(MESH)
-    (entry,) = (project / NAME).rglob("*.json")
+    (entry,) = findings_cache.rglob("*.json")
     before = entry.stat().st_ino
     assert codes(project) == first and len(checked) == 1
     assert entry.stat().st_ino != before, "the entry was written anew"
@@ -139,9 +141,9 @@ def test_a_model_that_includes_another_file_is_always_checked(project, checked):
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"key": 1}', "\x00"])
-def test_a_broken_entry_is_no_entry(project, checked, content):
+def test_a_broken_entry_is_no_entry(project, checked, content, findings_cache):
     first = codes(project)
-    (entry,) = (project / NAME).rglob("*.json")
+    (entry,) = findings_cache.rglob("*.json")
     entry.write_text(content)
     assert codes(project) == first and len(checked) == 2
     assert json.loads(entry.read_text())["findings"]
@@ -155,9 +157,9 @@ def _places(value, *way):
         yield from _places(part, *way, key)
 
 
-def test_an_entry_with_anything_of_another_type_is_no_entry(project, checked):
+def test_an_entry_with_anything_of_another_type_is_no_entry(project, checked, findings_cache):
     first = check_files([str(project / "m.osim")], Config())
-    (entry,) = (project / NAME).rglob("*.json")
+    (entry,) = findings_cache.rglob("*.json")
     whole = json.loads(entry.read_text())
     assert whole["outside"] and any(values[-1] for values in whole["findings"])
     tried = 0
@@ -203,26 +205,28 @@ def test_an_entry_with_anything_of_another_type_is_no_entry(project, checked):
     ],
     ids=str,
 )
-def test_an_entry_is_read_by_its_schema_or_not_at_all(project, checked, damage):
+def test_an_entry_is_read_by_its_schema_or_not_at_all(project, checked, damage, findings_cache):
     first = check_files([str(project / "m.osim")], Config())
-    (entry,) = (project / NAME).rglob("*.json")
+    (entry,) = findings_cache.rglob("*.json")
     entry.write_text(json.dumps(json.loads(entry.read_text()) | damage))
     again = check_files([str(project / "m.osim")], Config())
     assert (again.findings, again.unmeasured) == (first.findings, first.unmeasured)
     assert len(checked) == 2
 
 
-def test_a_cache_that_cannot_be_written_is_done_without(project, checked):
-    (project / NAME).write_text("a file stands in its place")
+def test_a_cache_that_cannot_be_written_is_done_without(project, checked, findings_cache):
+    findings_cache.rmdir()
+    findings_cache.write_text("a file stands in its place")
     assert codes(project) == codes(project)
     assert len(checked) == 2
 
 
-def test_without_settings_the_cache_is_the_users(monkeypatch, tmp_path):
-    monkeypatch.setattr("sys.platform", "linux")
+@pytest.mark.skipif(sys.platform != "linux", reason="the variable is that of Linux")
+def test_the_cache_is_in_the_folder_of_the_user(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert folder_for(None) == tmp_path / "osimlite"
-    assert folder_for(tmp_path / "pyproject.toml") == tmp_path / NAME
+    assert user_cache_folder() == tmp_path / "osimlite"
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    assert user_cache_folder() == Path.home() / ".cache" / "osimlite"
 
 
 def test_shared_work_finds_the_same_in_the_same_order(project):

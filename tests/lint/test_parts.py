@@ -105,13 +105,12 @@ def test_a_path_more_or_less(asked, fixtures):
     assert len(asked) == 3 and len(asked[-1]) == 1
 
 
-def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch):
+def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch, findings_cache):
     text = (fixtures / "lint" / "OSIM632" / "fail-02-two-coordinates.osim").read_text()
     path = tmp_path / "m.osim"
-    (tmp_path / "osimlite.toml").write_text("")
     path.write_text(text)
     result = check_files([str(path)], Config()).codes
-    (kept,) = tmp_path.glob(".osimlite_cache/*/measured/*.json")
+    (kept,) = findings_cache.glob("*/measured/*.json")
     subject = Subject(osimlite.document.survey.survey(Source(text.encode())))
     own = parts.parts_of(subject)
     parts._memory.clear()

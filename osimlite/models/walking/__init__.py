@@ -6,7 +6,7 @@ from pathlib import Path
 
 from osimlite.document.printer import to_text
 from osimlite.errors import SettingError
-from osimlite.files import make_folder, write_atomically
+from osimlite.files import make_folder, read_file, write_atomically
 from osimlite.models.jumper import jumper
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import HuntCrossleyForce
@@ -54,7 +54,7 @@ def write_scenario(folder: Path) -> Path:
     for ending in ENDINGS:
         files[folder / f"{SCENARIO}{ending}"] = Path(__file__).with_name(f"{SCENARIO}{ending}").read_bytes()
     for path, content in files.items():
-        if path.exists() and path.read_bytes() != content:
+        if path.exists() and read_file(path) != content:
             raise SettingError(
                 f"'{path}' is there already, and changed: run '{folder / SCENARIO}.scone', or take another folder"
             )

@@ -182,7 +182,8 @@ def _folders() -> Iterator[Path]:
         return
     yield Path(__file__).parents[2] / "kernels" / "__pycache__"
     home: str | Path | None = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
-    if not home:
+    # A relative path would lead into whatever folder the program is started in.
+    if not home or not os.path.isabs(home):
         try:
             home = Path.home() / ".cache"
         except RuntimeError:
