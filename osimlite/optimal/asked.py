@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from osimlite.errors import DocumentError, OsimliteError, UnsupportedError
+from osimlite.files import read_file
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Value, domain_test
+from osimlite.schema.patterns import Pattern, PatternError, UnsupportedPatternError
 from osimlite.schema.registry import MODULES
 from osimlite.schema.specs import FieldSpec, value_specs
 from osimlite.simulation.files.storage import beside
@@ -26,6 +28,13 @@ def in_file(file: object) -> Iterator[None]:
         if error.file is None and isinstance(file, str | Path):
             error.file = str(file)
         raise
+
+
+MAX_MESH_INTERVALS = 20_000
+"""Intervals of a mesh. Published studies have some hundred; each takes memory and time."""
+
+MAX_MESH_VALUES = 2_000_000
+"""Intervals of a mesh times states of the model."""
 
 
 class Asked:
@@ -51,8 +60,8 @@ class Asked:
         tags = re.compile(rf"<{re.escape(_tag(part))}(\s[^>]*)?/?>")
         named = re.compile(rf'name="{re.escape(part.name)}"')
         try:
-            lines = self.file.read_text(encoding="utf-8").splitlines()
-        except (OSError, UnicodeError):
+            lines = read_file(self.file).decode("utf-8", "replace").splitlines()
+        except OsimliteError:
             return {"file": str(self.file)}
         found = [(number, text) for number, text in enumerate(lines, 1) if tags.search(text)]
         found = [pair for pair in found if named.search(pair[1])] or found
@@ -109,8 +118,10 @@ class Asked:
             DocumentError: it is none.
         """
         try:
-            return re.compile(text).fullmatch
-        except re.error as error:
+            return Pattern(text).fullmatch
+        except UnsupportedPatternError as error:
+            raise self.refused(part, f"the pattern '{text}' is not supported: {error}") from None
+        except PatternError as error:
             raise self.wrong(part, f"'{text}' is no pattern: {error}") from None
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -16,6 +15,7 @@ from osimlite.schema.base import Component
 from osimlite.schema.moco.parts import MocoVariableInfo
 from osimlite.schema.moco.studies import MocoPhase
 from osimlite.schema.muscles import DeGrooteFregly2016Muscle, Muscle
+from osimlite.schema.patterns import Pattern
 
 Range = tuple[float, float]
 FREE: Range = (-math.inf, math.inf)
@@ -61,7 +61,7 @@ class _Infos:
     ) -> None:
         self.said: dict[str, MocoVariableInfo] = {}
         for info in patterns:
-            matches = re.compile(info.name).fullmatch
+            matches = Pattern(info.name).fullmatch
             self.said |= {name: info for name in names if matches(name)}
         self.said |= {info.name: info for info in infos}
 

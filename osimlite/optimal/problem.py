@@ -17,7 +17,7 @@ from osimlite.backends.symbols import casadi
 from osimlite.errors import SettingError
 from osimlite.modifying.processing import processed
 from osimlite.multibody.spatial import Array
-from osimlite.optimal.asked import Asked
+from osimlite.optimal.asked import MAX_MESH_INTERVALS, MAX_MESH_VALUES, Asked
 from osimlite.optimal.bounds import FREE, Range, control_bounds, range_of, scaling, state_bounds
 from osimlite.optimal.dynamics import Dynamics
 from osimlite.optimal.given_motion import GivenDynamics, GivenMotion, Motion, motion_of
@@ -290,6 +290,11 @@ class Problem(Asked):
 
     def _mesh(self) -> Array:
         solver = self.solver
+        intervals = len(solver.mesh) or solver.num_mesh_intervals
+        most = min(MAX_MESH_INTERVALS, MAX_MESH_VALUES // max(1, len(self.functions.states)))
+        if intervals > most:
+            message = f"the mesh has {intervals} intervals; at most {most} are solved of this model"
+            raise self.wrong(solver, message)
         if not solver.mesh:
             return np.linspace(0.0, 1.0, solver.num_mesh_intervals + 1)
         mesh = np.array(solver.mesh)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from osimlite.optimal.asked import Asked
+import numpy as np
+
+from osimlite.optimal.asked import MAX_MESH_INTERVALS, Asked
 from osimlite.schema.moco.parts import MocoFinalBounds, MocoInitialBounds
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoInverse, MocoPhase, MocoProblem, MocoStudy, MocoTrack
 from osimlite.schema.model import Model
@@ -35,6 +37,10 @@ def set_times(
         message = f"from {start:g} s to {end:g} s there are no data; they are from {first:g} s to {last:g} s"
         raise asked.wrong(tool, message)
     assert isinstance(study.solver, MocoCasADiSolver)
+    # The quotient of a tiny interval is no integer any more, or infinite.
+    if not 0.0 < tool.mesh_interval < np.inf or (end - start) / MAX_MESH_INTERVALS > tool.mesh_interval:
+        message = f"mesh_interval is {tool.mesh_interval:g} s; at most {MAX_MESH_INTERVALS} intervals are solved"
+        raise asked.wrong(tool, message)
     study.solver.num_mesh_intervals = math.ceil((end - start) / tool.mesh_interval)
     if tool.clip_time_range:
         start, end = start + 1e-3, end - 1e-3

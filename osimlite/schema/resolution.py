@@ -6,12 +6,12 @@ properties look a bare name up in one set, and nothing searches.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from osimlite.schema.base import Component, Object
+from osimlite.schema.patterns import Pattern, PatternError, UnsupportedPatternError
 from osimlite.schema.states import variables
 
 if TYPE_CHECKING:
@@ -129,8 +129,11 @@ def _variable(tree: Tree, text: str, owner: Component, target: str) -> Resolutio
 def _pattern(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
     """A regular expression that the whole name of one at least must match."""
     try:
-        pattern = re.compile(text)
-    except re.error:
+        pattern = Pattern(text)
+    except UnsupportedPatternError:
+        # OpenSim may match names with it: nothing can be said.
+        return Resolution(owner)
+    except PatternError:
         return Resolution(None, "illegal")
     result = next((item for name, item in variables(tree, target).items() if pattern.fullmatch(name)), None)
     return Resolution(result, None if result is not None else "missing")

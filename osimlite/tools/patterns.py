@@ -1,0 +1,86 @@
+"""Find files by patterns such as ``subjects/*/ik.xml`` or ``**/*.xml``."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Iterable, Iterator
+from fnmatch import fnmatch
+from glob import has_magic
+
+from osimlite.errors import OsimliteError
+
+MAX_ENTRIES = 1_000_000
+"""Entries of folders that one pattern looks at."""
+
+
+def find_files(pattern: str) -> list[str]:
+    """Return the files that match a pattern, sorted, each once.
+
+    ``*``, ``?`` and ``[...]`` match within a name, ``**`` any number of folders. Names that begin with
+    a dot match only where the pattern has the dot. Links to folders are followed, but every folder is
+    visited once: two links to ``.`` would otherwise have 2^40 paths below them.
+
+    Raises:
+        OsimliteError: the pattern looks at more than `MAX_ENTRIES` entries.
+    """
+    drive, rest = os.path.splitdrive(pattern)
+    rooted = rest.startswith(("/", os.sep))
+    parts = [part for part in rest.replace(os.sep, "/").split("/") if part]
+    search = _Search(pattern)
+    places = [drive + os.sep if rooted else drive]
+    for part in parts:
+        places = list(dict.fromkeys(search.step(places, part)))
+    return sorted(filter(os.path.isfile, places))
+
+
+class _Search:
+    """One search for files, which looks at a bounded number of entries."""
+
+    def __init__(self, pattern: str) -> None:
+        self.pattern, self.left = pattern, MAX_ENTRIES
+
+    def step(self, places: Iterable[str], part: str) -> Iterator[str]:
+        """Yield the paths that one part of a pattern leads to from some places."""
+        if part == "**":
+            yield from self._folders_below(places)
+            return
+        for place in places:
+            if not has_magic(part):
+                path = os.path.join(place, part)
+                if os.path.lexists(path):
+                    yield path
+                continue
+            for entry in self._entries(place):
+                is_shown = not entry.name.startswith(".") or part.startswith(".")
+                if is_shown and fnmatch(entry.name, part):
+                    yield os.path.join(place, entry.name)
+
+    def _folders_below(self, places: Iterable[str]) -> Iterator[str]:
+        visited: set[str] = set()
+        # Folders behind links come last, so that a folder is known by its own name.
+        waiting, behind_links = deque(places), deque[str]()
+        while waiting or behind_links:
+            folder = (waiting or behind_links).popleft()
+            real = os.path.realpath(folder or ".")
+            if real in visited or not os.path.isdir(real):
+                continue
+            visited.add(real)
+            yield folder
+            for entry in self._entries(folder):
+                if not entry.name.startswith(".") and entry.is_dir():
+                    queue = behind_links if entry.is_symlink() else waiting
+                    queue.append(os.path.join(folder, entry.name))
+
+    def _entries(self, folder: str) -> list[os.DirEntry[str]]:
+        try:
+            with os.scandir(folder or ".") as entries:
+                found = sorted(entries, key=lambda entry: entry.name)
+        except OSError:
+            return []
+        self.left -= len(found)
+        if self.left < 0:
+            raise OsimliteError(
+                f"the pattern '{self.pattern}' looks at more than {MAX_ENTRIES} files; name the folders"
+            )
+        return found
