@@ -204,6 +204,19 @@ class Object(BaseModel, metaclass=ObjectType):
         except ValidationError as error:
             raise ModelError(explained(type(self), error)) from None
 
+    def assign(self, name: str, value: Any) -> None:
+        """Set a property to a value that is already of the stored form, without validation.
+
+        Pydantic compiles the validation of a class when a property is set for the first time, which takes milliseconds.
+
+        Args:
+            name: of the property in Python.
+            value: of the stored form, not an object.
+        """
+        note_change(self._model, numbers_only=name in numeric_names(type(self)))
+        self.__dict__[name] = value
+        self.model_fields_set.add(name)
+
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):
             return NotImplemented

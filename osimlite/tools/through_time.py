@@ -111,7 +111,7 @@ def _from_here(job: Job, item: Object) -> Any:
         for spec in file_specs(type(part), "file"):
             path = job.place(str(getattr(part, spec.name) or ""))
             if path is not None:
-                setattr(part, spec.name, str(path.absolute()))
+                part.assign(spec.name, str(path.absolute()))
     return item
 
 

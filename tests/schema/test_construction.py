@@ -187,3 +187,10 @@ def test_a_star_brings_the_component_classes():
     names: dict[str, object] = {}
     exec("from osimlite import *", names)
     assert names["PinJoint"] is osimlite.PinJoint and names["simulate"] is osimlite.simulate
+
+
+def test_values_of_the_stored_form_are_assigned_without_validation() -> None:
+    body = osimlite.Body(name="b")
+    body.assign("mass", 2.5)
+    assert body.mass == 2.5 and "mass" in body.model_fields_set
+    assert "<mass>2.5</mass>" in osimlite.to_text(osimlite.Model(name="m", body_set=osimlite.BodySet(objects=[body])))

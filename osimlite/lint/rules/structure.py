@@ -15,7 +15,7 @@ from osimlite.lint.words import a, called, shown
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Held
 from osimlite.schema.model import CURRENT_VERSION, Model
-from osimlite.schema.registry import class_for, tags
+from osimlite.schema.registry import classes_mentioning
 from osimlite.schema.specs import FieldSpec, field_specs
 from osimlite.text import listed, nearest
 
@@ -209,9 +209,8 @@ def _homes(tag: str, owner: type[Object]) -> list[str]:
     In a model those of tools are left out, and the other way round.
     """
     homes, package = set(), owner.__module__.rpartition(".")[0]
-    for name in tags():
-        cls = class_for(name)
-        spec = field_specs(cls).get(tag) if cls is not None else None
+    for cls in classes_mentioning(tag):
+        spec = field_specs(cls).get(tag)
         if spec is not None and spec.declared_in.__module__.rpartition(".")[0] == package:
             homes.add(spec.declared_in.__name__)
     return sorted(homes)

@@ -1,0 +1,26 @@
+"""Where a property belongs is found without building the classes that have nothing to do with it."""
+
+from __future__ import annotations
+
+from osimlite.lint.rules.structure import _homes
+from osimlite.schema.base import Object
+from osimlite.schema.registry import class_for, tags
+from osimlite.schema.specs import field_specs
+
+
+def find_homes(tag: str, package: str) -> list[str]:
+    """Return the classes of a package that declare a property, by looking into all classes."""
+    specs = (field_specs(class_for(name) or Object).get(tag) for name in tags())
+    declaring = {spec.declared_in for spec in specs if spec is not None}
+    return sorted(cls.__name__ for cls in declaring if cls.__module__.rpartition(".")[0] == package)
+
+
+def test_every_property_is_found_in_the_classes_that_declare_it() -> None:
+    classes = [class_for(name) or Object for name in tags()]
+    owners = {cls.__module__.rpartition(".")[0]: cls for cls in classes}
+    properties = {tag for cls in classes for tag in field_specs(cls)}
+    assert len(owners) == 3 and len(properties) > 700
+    for tag in sorted(properties):
+        for package, owner in owners.items():
+            assert _homes(tag, owner) == find_homes(tag, package)
+    assert _homes("isDisabled", Object) == []
