@@ -25,6 +25,9 @@ from osimlite.simulation.elements.signals import TableColumn
 from osimlite.simulation.files.storage import StoTable
 from osimlite.text import did_you_mean, listed
 
+PRINTED_S = 1e-6
+"""Tolerance of the ends of a table, s: its times were printed with few digits, those of the motion were not."""
+
 
 @dataclass(frozen=True)
 class Called(Function):
@@ -42,7 +45,14 @@ class Called(Function):
         return zeros(1, value)
 
 
-def driven(controls: Controls, given: Mapping[str, Any] | StoTable | str | Path | None, to: float) -> Controls:
+def driven(
+    controls: Controls,
+    given: Mapping[str, Any] | StoTable | str | Path | None,
+    to: float,
+    *,
+    start: float = 0.0,
+    what: str = "controls",
+) -> Controls:
     """What a run adds to the controls of a model, as a PrescribedController more would add it.
 
     Between the rows of a table are straight lines; before and after, its first and last values hold.
@@ -52,18 +62,20 @@ def driven(controls: Controls, given: Mapping[str, Any] | StoTable | str | Path 
         given: by the name or path of an actuator a number, a function of time (s) or ``(times, values)``; or a table
             of such columns, or the file of one or of a ControlSet.
         to: end of the motion, s, up to which tables should go.
+        start: of the motion, s.
+        what: what is given, for messages.
 
     Raises:
         OsimliteError: an actuator is not there, or driven twice; or a file cannot be read.
         SettingError: a control is no number, or times do not increase.
         SimulationError: a TableSource of the model does not go as far as the motion.
     """
-    require_tables(controls, 0.0, to)
+    require_tables(controls, start, to)
     if given is None:
         return controls
     known = {key: name for name in controls.names for key in (name.rpartition("/")[2], name)}
     functions: dict[str, Function] = {}
-    start, end = -inf, inf
+    begin, end = -inf, inf
     for key, value in _by_name(given).items():
         if key not in known:
             raise SettingError(f"the model has no actuator '{key}' to control{did_you_mean(key, known)}")
@@ -74,13 +86,13 @@ def driven(controls: Controls, given: Mapping[str, Any] | StoTable | str | Path 
             raise SettingError(f"'{known[key]}' is controlled twice, by its name and by its path; leave one out")
         if isinstance(value, tuple):
             functions[known[key]], first, last = _lines(key, *value)
-            start, end = max(start, first), min(end, last)
+            begin, end = max(begin, first), min(end, last)
         else:
             functions[known[key]] = _function(key, value)
-    if start > 0.0 or end < to:
+    if begin > start + PRINTED_S or end < to - PRINTED_S:
         tell(
-            f"the controls are given from {max(start, 0.0):g} to {min(end, to):g} s of a motion from 0 to {to:g} s; "
-            "their first and last values hold before and after"
+            f"the {what} are given from {max(begin, start):g} to {min(end, to):g} s of a motion from {start:g} to "
+            f"{to:g} s; their first and last values hold before and after"
         )
     return controls.driven(functions)
 

@@ -175,7 +175,7 @@ class StateLayout:
 
     def histories(self, states: Sequence[Sequence[float]]) -> tuple[Array, Array]:
         """Values and speeds (k, n) of all coordinates at k states."""
-        rows, count = np.array(states, dtype=float).reshape(len(states), -1), len(self.order)
+        rows, count = np.array(states, dtype=float).reshape(len(states), self.size), len(self.order)
         values, speeds = np.empty((len(states), len(self._still))), np.zeros((len(states), len(self._still)))
         values[:] = self._still
         values[:, self.order], speeds[:, self.order] = rows[:, :count], rows[:, count : 2 * count]

@@ -38,6 +38,7 @@ from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.engines.linking import best
 from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.force_labels import label_as_opensim
 from osimlite.simulation.system import System
 from osimlite.text import counted, listed, or_known
 
@@ -144,6 +145,8 @@ class StaticOptimization:
         self.mechanism, self._exponent = mechanism, exponent
         model = model.copy_deep()
         model.controller_set.objects.clear()
+        # No probe is reported here, and those of muscles would miss the muscles that are replaced below.
+        model.probe_set.objects.clear()
         self._actuators = _idealised(model, muscles != "isometric")
         tree = model.tree()
         self._paths = [tree.path_of(item) or "" for item in self._actuators]
@@ -283,7 +286,9 @@ class StaticOptimization:
         # What accelerations of one coordinate take beyond those of none: the mass matrix.
         tried = np.vstack([np.zeros(size), np.eye(size)])
         taken = system.missing(np.repeat(moments, size + 1, axis=0), tried)
-        turned = ways[0]
+        # Where constraints close loops, the columns of `ways` are more than the freedoms: an orthonormal basis of what
+        # they span has the same motions, and a mass matrix that can be inverted.
+        turned = span(ways[0])
         mass = turned[order].T @ (taken[1:] - taken[0]).T @ turned[order]
         right = np.column_stack([-needed[0], (pushes[0] / self.optimal_forces[:, None]).T])
         found = turned @ np.linalg.solve(mass, np.hstack([turned[order].T @ right, turned.T]))
@@ -360,7 +365,14 @@ class StaticOptimization:
         places = {path: k for k, path in enumerate(self._paths)}
         own = [column for column, path in enumerate(owners) if path in places]
         rows[:, own] = shared.forces[:, [places[owners[column]] for column in own]]
-        return StoTable(FORCES_TITLE, shared.times, tuple(labels), rows)
+        return StoTable(FORCES_TITLE, shared.times, tuple(label_as_opensim(labels)), rows)
+
+
+def span(columns: Array) -> Array:
+    """Return an orthonormal basis (n, r) of what columns (n, m) span."""
+    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    result: Array = basis[:, sizes > ALIKE * sizes.max(initial=0.0)]
+    return result
 
 
 def least_effort(

@@ -212,8 +212,62 @@ class System:
         Raises:
             SimulationError: a force has no equilibrium, or the rates of coordinates are not defined there.
         """
+        result, failed = self._equilibrate_all(t, y, numbers)
+        if failed is not None:
+            muscle = self._told(self.structure[self._equilibrium_at(failed) + layout.EQUILIBRIUM.ITEM])
+            raise SimulationError(f"no equilibrium was found of {muscle}; start elsewhere, or without an equilibrium")
+        return result
+
+    def equilibrate_each(self, t: float, y: Sequence[float]) -> tuple[list[float], dict[str, str]]:
+        """Bring every muscle that can be into equilibrium, whether or not others can.
+
+        Args:
+            t: time, s.
+            y: the state (y,).
+
+        Returns:
+            The state (y,), in which muscles without equilibrium keep their states, and by the paths of these muscles
+            what is said of each.
+
+        Raises:
+            SimulationError: the rates of coordinates are not defined there.
+        """
+        result, failed = self._equilibrate_all(t, y)
+        if failed is None:
+            return result, {}
+        reasons, count = {}, int(self.structure[MODEL.EQUILIBRIA])
+        code, room = self.program.code, (self._w, self._y, self._f)
+        code.make_ready(("equilibrate",))
+        while failed is not None:
+            item = int(self.structure[self._equilibrium_at(failed) + layout.EQUILIBRIUM.ITEM])
+            reasons[self.forces.elements[self._owners[item]].path] = self._told(item)
+            # The kernel names the first failure only: it is asked again, of those behind it.
+            ints = self.program.ints.copy()
+            ints[MODEL.EQUILIBRIA] = count - (failed + 1)
+            ints[MODEL.EQUILIBRIUM_AT] = self._equilibrium_at(failed + 1)
+            self._set(t, y)
+            status = self._run(partial(code.entry("equilibrate"), ints, self.numbers, *room), STAGE.VELOCITY)
+            failed = failed + 1 + int(self._f[0]) if status == OUTCOME.UNSOLVED else None
+        for element in self.forces.elements:
+            if element.path in reasons and element.states:
+                first = self.state.first_of(element)
+                result[first : first + len(element.states)] = y[first : first + len(element.states)]
+        return result, reasons
+
+    def _equilibrium_at(self, number: int) -> int:
+        """Return the offset of the record of one of the equilibria."""
+        return int(self.structure[MODEL.EQUILIBRIUM_AT]) + layout.EQUILIBRIUM.SIZE * number
+
+    def _equilibrate_all(
+        self, t: float, y: Sequence[float], numbers: Floats | None = None
+    ) -> tuple[list[float], int | None]:
+        """Bring all muscles into equilibrium; return the state and the number of the first without one, if any.
+
+        Raises:
+            SimulationError: the rates of coordinates are not defined there.
+        """
         if not self.structure[MODEL.EQUILIBRIA]:
-            return list(y)
+            return list(y), None
         code, ints, room = self.program.code, self.program.ints, (self._w, self._y, self._f)
         if self._equilibrate is None:
             self.program.link_equilibria()
@@ -226,12 +280,10 @@ class System:
             # Kernels as Python raise what machine code computes as no number.
             raise SimulationError(f"the equilibrium of the muscles cannot be computed: {failure}") from failure
         if status == OUTCOME.UNSOLVED:
-            place = self.structure[MODEL.EQUILIBRIUM_AT] + layout.EQUILIBRIUM.SIZE * int(self._f[0])
-            muscle = self._told(self.structure[place + layout.EQUILIBRIUM.ITEM])
-            raise SimulationError(f"no equilibrium was found of {muscle}; start elsewhere, or without an equilibrium")
+            return self._y.tolist(), int(self._f[0])
         if status != OUTCOME.OK:
             raise self.refusal(status, t, y)
-        return self._y.tolist()
+        return self._y.tolist(), None
 
     def _told(self, item: int) -> str:
         """What an item is that has no solution."""

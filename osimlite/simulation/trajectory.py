@@ -19,6 +19,7 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.snapshot import Snapshot
 from osimlite.simulation.files.storage import StoTable, sto_text
+from osimlite.simulation.force_labels import label_as_opensim
 from osimlite.simulation.tabular import Tabular
 from osimlite.text import json_lines
 
@@ -187,9 +188,7 @@ class Trajectory(Tabular):
     def forces_text(self) -> str:
         """The text of forces.sto, with the labels of OpenSim's ForceReporter."""
         labels, table = self._force_table
-        # There, the energy of every limit force has one and the same label.
-        labels = ["PotentialEnergy" if label.endswith(".PotentialEnergy") else label for label in labels]
-        return sto_text("ModelForces", self.times.tolist(), labels, table.tolist())
+        return sto_text("ModelForces", self.times.tolist(), label_as_opensim(labels), table.tolist())
 
     def probes_text(self) -> str:
         """The text of probes.sto, with the labels of OpenSim's ProbeReporter; empty if there are no probes."""

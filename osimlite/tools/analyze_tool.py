@@ -14,9 +14,10 @@ from osimlite.simulation.files.recorded import RecordedMotion
 from osimlite.simulation.files.storage import read_sto
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.start import columns_of_states
+from osimlite.simulation.system import System
 from osimlite.text import listed
 from osimlite.tools.job import Job
-from osimlite.tools.motion import Motion, Record
+from osimlite.tools.motion import BoolArray, Motion, Record
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.through_time import (
     StateRows,
@@ -30,6 +31,8 @@ from osimlite.tools.through_time import (
 
 SAME_TIME = 2.0**-45.5
 """How much later or earlier a row of speeds may be than that of the coordinates, s."""
+MOST_SPANS = 5
+"""Spans of time without an equilibrium that a message names."""
 
 
 def run(job: Job, outcome: Outcome) -> None:
@@ -49,14 +52,73 @@ def run(job: Job, outcome: Outcome) -> None:
             first, last = given.row(setup.initial_time), given.row(setup.final_time)
             table, record = given.table, lambda: (given.table.times, given.speeds(simulation))
             rows = ((float(table.times[k]), given.state(simulation, k)) for k in range(first, last + 1))
-        equilibrate, engine = setup.solve_for_equilibrium_for_auxiliary_states, simulation.engine
-        kept = [(t, engine.equilibrated(t, y) if equilibrate else y) for t, y in rows]
-        if not kept:
+        moments = list(rows)
+        if not moments:
             raise job.error(f"there is nothing from {setup.initial_time:g} s to {setup.final_time:g} s")
-        times, result = zip(*kept, strict=True)
-        motion = Motion(model, simulation, np.array(times), np.array(result), record=record)
+        times, result = np.array([t for t, _ in moments]), np.array([y for _, y in moments])
+        unbalanced: dict[str, BoolArray] = {}
+        if setup.solve_for_equilibrium_for_auxiliary_states:
+            unbalanced = equilibrate_rows(outcome, simulation, times, result)
+        motion = Motion(
+            model,
+            simulation,
+            times,
+            result,
+            record=record,
+            unbalanced=unbalanced,
+            simulate=lambda changed: simulation_of(job, changed),
+        )
         analyse(job, outcome, analyses, motion, first)
     tell_rows(job, outcome, motion)
+
+
+def equilibrate_rows(outcome: Outcome, simulation: Simulation, times: Array, states: Array) -> dict[str, BoolArray]:
+    """Bring the muscles into equilibrium at every time; say which have none, and when.
+
+    Like OpenSim's AnalyzeTool, this goes on where a muscle has no equilibrium. OpenSim leaves the fibers of that muscle
+    in any state then, and computes forces and accelerations from it; here its states become NaN.
+
+    Args:
+        outcome: that says so.
+        simulation: whose engine finds the equilibria.
+        times: (t,), s.
+        states: (t, y), changed in place.
+
+    Returns:
+        By path of each muscle that has no equilibrium at some time: whether it has none (t,).
+    """
+    engine = simulation.engine
+    assert isinstance(engine, System)
+    unbalanced: dict[str, BoolArray] = {}
+    reasons: dict[str, str] = {}
+    for row, (time, y) in enumerate(zip(times.tolist(), states.tolist(), strict=True)):
+        states[row], failed = engine.equilibrate_each(time, y)
+        for path, reason in failed.items():
+            reasons.setdefault(path, reason)
+            unbalanced.setdefault(path, np.zeros(len(times), dtype=bool))[row] = True
+    elements = {element.path: element for element in simulation.forces.elements}
+    for path, missing in unbalanced.items():
+        element = elements[path]
+        if element.states:
+            place = simulation.state.first_of(element)
+            states[missing, place : place + len(element.states)] = np.nan
+        outcome.tell(
+            "no equilibrium",
+            f"of {reasons[path]}: at {np.count_nonzero(missing)} of {len(times)} moments, {_spans(times, missing)}; "
+            "what depends on its fibers or its force is NaN then",
+        )
+    outcome.summary["without_equilibrium"] = {path: times[missing].tolist() for path, missing in unbalanced.items()}
+    if not unbalanced:
+        del outcome.summary["without_equilibrium"]
+    return unbalanced
+
+
+def _spans(times: Array, chosen: BoolArray) -> str:
+    """Return the spans of consecutive times that are chosen, in words."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
+    spans = [(times[first], times[last - 1]) for first, last in edges.reshape(-1, 2)]
+    words = [f"at {a:g} s" if a == b else f"from {a:g} s to {b:g} s" for a, b in spans]
+    return listed(words, most=MOST_SPANS)
 
 
 def _followed(

@@ -95,6 +95,11 @@ def recorded(motion: Motion) -> tuple[list[str], Array]:
     Forces come before moments, along the axes of the body that carries all those of a constraint. All have the opposite
     sign of what pushes, as the multipliers of Simbody have.
     """
+    if motion.unbalanced and motion.balanced.any():
+        columns, part = recorded(motion.select(motion.balanced))
+        result = np.full((len(motion.times), len(columns)), np.nan)
+        result[motion.balanced] = part
+        return columns, result
     mechanism, tree = motion.mechanism, motion.model.tree()
     names = {tree.path_of(item): item.name for item in motion.model.components(schema.Constraint)}
     labels: list[str] = []

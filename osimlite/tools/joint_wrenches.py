@@ -8,6 +8,7 @@ from osimlite.kernels.layout import LINK_WORK
 from osimlite.multibody.parts import GROUND
 from osimlite.multibody.spatial import Array
 from osimlite.schema.joints import Joint
+from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.link_motion import LinkMotion
 from osimlite.simulation.system import System
@@ -27,14 +28,25 @@ class JointWrenches:
 
     def __init__(self, motion: Motion, controls: Controls | None) -> None:
         self.mechanism = motion.mechanism
+        self.carried = {body.mobilizer.joint: index for index, body in enumerate(self.mechanism.bodies)}
         system = System(self.mechanism, motion.simulation.forces, apart=True)
         if controls is not None:
             system.drive(controls)
-        self.moved = LinkMotion.of(system, motion.table, motion.accelerations[:, list(system.order)])
+        balanced = motion.select(motion.balanced) if motion.unbalanced else motion
+        self.moved = LinkMotion.of(system, balanced.table, balanced.accelerations[:, list(system.order)])
         if self.mechanism.constrained:
-            for links, forces in zip(self.moved.links, ConstraintForces.along(motion), strict=True):
+            for links, forces in zip(self.moved.links, ConstraintForces.along(balanced), strict=True):
                 self._push(links, forces)
-        self.carried = {body.mobilizer.joint: index for index, body in enumerate(self.mechanism.bodies)}
+        if motion.unbalanced:
+            self.moved = LinkMotion(system, self._spread(motion))
+
+    def _spread(self, motion: Motion) -> Array:
+        """Return the links at all times (t, l, n): without wrenches where a muscle lacks an equilibrium."""
+        still = System(self.mechanism.released(), Forces(()), apart=True)
+        moments = np.column_stack([motion.times, still.state.rows(motion.values, motion.speeds)])
+        links = still.links_in_motion(moments, motion.accelerations[:, list(still.order)])
+        links[motion.balanced] = self.moved.links
+        return links
 
     def _push(self, links: Array, forces: ConstraintForces) -> None:
         """Let constraints push bodies (l, n), and all that carry them."""

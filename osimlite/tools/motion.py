@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from osimlite.errors import SettingError
 from osimlite.kernels.layout import STAGE
 from osimlite.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.records import dataclass, field, replace
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.link_motion import LinkMotion
+from osimlite.simulation.paths import Paths
 from osimlite.simulation.probed import Moment
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
@@ -29,6 +31,10 @@ from osimlite.tools.outcome import Outcome
 Record = tuple[Array, Array]
 """Times (r,) and generalized speeds (r, n)."""
 
+BoolArray = NDArray[np.bool_]
+
+PATH_RECORDS = {"length": "length", "rate": "rate", "speed": "rate"}
+"""Records of a muscle that follow from its path alone, whatever its fibers do."""
 LEAST_TIMES = 6
 """That splines of fifth degree go through."""
 
@@ -43,6 +49,11 @@ class Motion:
     states: Array  # (t, y), in the order of the simulation's engine
     steps: Sequence[Moment] = ()  # the start and the ends of all steps, if the motion was integrated
     record: Callable[[], Record] | None = None  # gives what was measured, of which the motion is a part
+    # By path of each muscle without an equilibrium at some times: whether it has none (t,). Its states are NaN then.
+    unbalanced: Mapping[str, BoolArray] = field(default_factory=dict)
+    # Makes the simulation of another version of the model; needed if some muscles are unbalanced.
+    simulate: Callable[[Model], Simulation] | None = None
+    left_out: frozenset[str] = frozenset()  # paths of muscles of the model that were switched off
 
     @cached_property
     def _found(self) -> dict[str, Any]:
@@ -69,6 +80,72 @@ class Motion:
     def table(self) -> Array:
         """Each time with its state (t, 1 + y)."""
         return np.column_stack([self.times, self.states])
+
+    def select(self, rows: BoolArray) -> Motion:
+        """Return the motion at some of its times.
+
+        Args:
+            rows: whether each time is among them (t,).
+        """
+        unbalanced = {path: missing[rows] for path, missing in self.unbalanced.items() if missing[rows].any()}
+        return replace(self, times=self.times[rows], states=self.states[rows], unbalanced=unbalanced)
+
+    @cached_property
+    def balanced(self) -> BoolArray:
+        """Whether every muscle that needs an equilibrium has one, at each time (t,)."""
+        return ~np.any([np.zeros(len(self.times), dtype=bool), *self.unbalanced.values()], axis=0)
+
+    @cached_property
+    def parts(self) -> list[tuple[BoolArray, Motion]]:
+        """Times (t,) at which the same muscles lack an equilibrium, and the motion then, without these muscles."""
+        if not self.unbalanced:
+            return [(np.ones(len(self.times), dtype=bool), self)]
+        names, missing = [*self.unbalanced], np.column_stack([*self.unbalanced.values()])
+        result = []
+        for pattern in np.unique(missing, axis=0):
+            rows = (missing == pattern).all(axis=1)
+            part = self.select(rows)
+            if pattern.any():
+                part = self._without(part, frozenset(np.array(names)[pattern].tolist()))
+            result.append((rows, part))
+        return result
+
+    def _without(self, part: Motion, muscles: frozenset[str]) -> Motion:
+        """Return a part of the motion with a model in which some muscles are switched off."""
+        assert self.simulate is not None
+        model = self.model.copy_deep()
+        tree = model.tree()
+        for path in muscles:
+            tree.at(path).appliesForce = False
+        # The states of what is off count for nothing, but must be numbers.
+        states = np.nan_to_num(part.states)
+        simulation = self.simulate(model)
+        return replace(part, model=model, simulation=simulation, states=states, unbalanced={}, left_out=muscles)
+
+    def compute_balanced(self, compute: Callable[[Motion], Array]) -> Array:
+        """Return rows (t, ...) of what needs the forces of all muscles; NaN where one lacks an equilibrium.
+
+        Args:
+            compute: gives the rows of a motion.
+        """
+        if not self.unbalanced:
+            return compute(self)
+        part = compute(self.select(self.balanced))
+        result = np.full((len(self.times), *part.shape[1:]), np.nan)
+        result[self.balanced] = part
+        return result
+
+    def compute_by_parts(self, compute: Callable[[Motion], Array]) -> Array:
+        """Return rows (t, ...) of what does not need the forces of muscles without equilibrium.
+
+        Args:
+            compute: gives the rows of a motion; `left_out` of that names muscles that are off.
+        """
+        rows = [(chosen, compute(part)) for chosen, part in self.parts]
+        result = np.full((len(self.times), *rows[0][1].shape[1:]), np.nan)
+        for chosen, part in rows:
+            result[chosen] = part
+        return result
 
     @property
     def moments(self) -> Iterator[tuple[float, list[float]]]:
@@ -98,18 +175,46 @@ class Motion:
         return {path: columns[path] for path in self.simulation.paths}
 
     def looked(self, places: Sequence[int], stage: int = STAGE.FORCE) -> Array:
-        """What the kernels find at every time (t, m); see :meth:`System.looked`."""
-        return self.system.looked(self.table, places, stage)
+        """What the kernels find at every time (t, m), NaN where a muscle lacks an equilibrium; see `System.looked`."""
+        return self.compute_balanced(lambda motion: motion.system.looked(motion.table, places, stage))
 
     def known(self, paths: Sequence[str], *names: str) -> dict[str, Array]:
-        """What is known of force elements of some paths at every time (t, m), by the names of their kinds."""
-        places = [place for path in paths for place in self.system.places_of(path, names)]
-        result = self.looked(places).reshape(len(self.times), len(paths), len(names))
+        """What is known of force elements of some paths at every time (t, m), by the names of their kinds.
+
+        At times when a muscle lacks an equilibrium only what follows from its path is known of it.
+        """
+        result = self.compute_by_parts(lambda motion: motion._records(paths, names))
+        if self.unbalanced:
+            self._add_path_records(result, paths, names)
         return {name: result[:, :, k] for k, name in enumerate(names)}
+
+    def _records(self, paths: Sequence[str], names: Sequence[str]) -> Array:
+        """Records (t, p, m) of force elements; NaN of those that are left out."""
+        result = np.full((len(self.times), len(paths), len(names)), np.nan)
+        there = [k for k, path in enumerate(paths) if path not in self.left_out]
+        places = [place for k in there for place in self.system.places_of(paths[k], names)]
+        result[:, there] = self.looked(places).reshape(len(self.times), len(there), len(names))
+        return result
+
+    def _add_path_records(self, result: Array, paths: Sequence[str], names: Sequence[str]) -> None:
+        """Fill in lengths and speeds of the paths of muscles without equilibrium."""
+        wanted = [k for k, name in enumerate(names) if name in PATH_RECORDS]
+        chosen = [k for k, path in enumerate(paths) if path in self.unbalanced]
+        if not (wanted and chosen):
+            return
+        measured = Paths(self.model)
+        for row in np.flatnonzero(~self.balanced):
+            lengths = measured.lengths(self.values[row])
+            speeds = measured.speeds(self.values[row], self.speeds[row])
+            for muscle in chosen:
+                if self.unbalanced[paths[muscle]][row]:
+                    for k in wanted:
+                        source = lengths if PATH_RECORDS[names[k]] == "length" else speeds
+                        result[row, muscle, k] = source[paths[muscle]]
 
     @cached_property
     def accelerations(self) -> Array:
-        """Derivatives of the speeds (t, n), by all that acts on the model."""
+        """Derivatives of the speeds (t, n), by all that acts on the model; NaN where a muscle lacks an equilibrium."""
         order, result = list(self.simulation.state.order), np.zeros_like(self.values)
         first = self.system.room + len(order)
         result[:, order] = self.looked(range(first, first + len(order)), STAGE.ACCELERATION)
@@ -166,6 +271,7 @@ class Tables:
     outcome: Outcome  # that has them written
     name: str  # of the analysis
     times: Array  # of all rows (t,), s
+    note: str = ""  # what the header says of rows that are no numbers
 
     def add(
         self,
@@ -189,6 +295,8 @@ class Tables:
             description: what the header says besides.
             of: what stands before the suffix in the file's name, if not the analysis alone.
         """
+        if self.note and np.isnan(rows).any():
+            description = f"\n{self.note}{description}"
         table = StoTable(title, self.times, tuple(columns), rows, in_degrees)
         self.outcome.table(self._path(f"{of}_{suffix}"), table, description, self.job.setup.output_precision)
 

@@ -144,12 +144,20 @@ SYSTEM: dict[str, Callable[..., Any]] = {
 
 def _potential_energy(motion: Motion, model: Model, path: str) -> Array:
     """Of gravity and of all forces."""
-    return np.array([[sum(motion.system.energies(t, y)[1:])] for t, y in motion.moments])
+    return motion.compute_balanced(
+        lambda part: np.array([sum(part.system.energies(t, y)[1:]) for t, y in part.moments]).reshape(-1, 1)
+    )
 
 
 def _stored(motion: Motion, force: Force, path: str) -> Array:
     """The potential energy of a force."""
-    return np.array([[motion.system.energy_of(path, t, y)] for t, y in motion.moments])
+
+    def compute(part: Motion) -> Array:
+        if path in part.left_out:
+            return np.full((len(part.times), 1), np.nan)
+        return np.array([part.system.energy_of(path, t, y) for t, y in part.moments]).reshape(-1, 1)
+
+    return motion.compute_by_parts(compute)
 
 
 def _known(name: str) -> Reader:
@@ -173,9 +181,13 @@ def _power(motion: Motion, actuator: ScalarActuator, path: str) -> Array:
 
 
 def _excitation(motion: Motion, muscle: Muscle, path: str) -> Array:
-    system = motion.system
-    place = system.places_of_controls[motion.simulation.forces.controls.names.index(path)]
-    return motion.looked([place])
+    def compute(part: Motion) -> Array:
+        names = part.simulation.forces.controls.names
+        if path not in names:
+            return np.full((len(part.times), 1), np.nan)
+        return part.looked([part.system.places_of_controls[names.index(path)]])
+
+    return motion.compute_by_parts(compute)
 
 
 def _reaction(side: str) -> Reader:

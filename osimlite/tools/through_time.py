@@ -13,7 +13,6 @@ import numpy as np
 from osimlite._load import module_name
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
-from osimlite.records import replace
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Object
 from osimlite.schema.controller_types import CorrectionController, PrescribedController
@@ -75,8 +74,16 @@ def analyse(job: Job, outcome: Outcome, analyses: Analyses, motion: Motion, firs
         if item.step_interval > 1:
             chosen = numbers % item.step_interval == 0
             chosen[[0, -1]] = True
-            own = replace(motion, times=motion.times[chosen], states=motion.states[chosen])
-        module.compute(item, own, Tables(job, outcome, item.name, own.times))
+            own = motion.select(chosen)
+        module.compute(item, own, Tables(job, outcome, item.name, own.times, describe_gaps(own)))
+
+
+def describe_gaps(motion: Motion) -> str:
+    """Return what the header of a table says of numbers that are missing for want of an equilibrium; "" for nothing."""
+    if not motion.unbalanced:
+        return ""
+    names = listed([path.rpartition("/")[2] for path in motion.unbalanced])
+    return f"NaN stands where no equilibrium of fibers and tendon was found of {names}, and for what depends on it.\n"
 
 
 def told_model(job: Job) -> Model:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.schema.forces import CoordinateLimitForce
+from osimlite.multibody.spatial import Array
 from osimlite.schema.tools.analyses import ForceReporter
 from osimlite.simulation.files.old_storage import UNITS
+from osimlite.simulation.force_labels import label_as_opensim
+from osimlite.simulation.system import System
 from osimlite.tools.constraint_forces import recorded
 from osimlite.tools.motion import Motion, Tables
 
-ENERGY = "PotentialEnergy"
 DESCRIPTION = (
     "\nThis file contains the forces exerted on a model during a simulation.\n"
     "\nA force is a generalized force, meaning that it can be either a force (N) or a torque (Nm).\n"
@@ -21,12 +22,24 @@ DESCRIPTION = (
 
 def compute(analysis: ForceReporter, motion: Motion, tables: Tables) -> None:
     """Write the columns of every force, and of every constraint if they are asked for."""
-    engine = motion.simulation.engine
-    rows = np.array([engine.force_records(t, y) for t, y in motion.moments]).reshape(len(motion.times), -1)
-    # These energies have one label, however many there are.
-    stored = {f"{force.name}.{ENERGY}" for force in motion.model.components(CoordinateLimitForce)}
-    labels = [ENERGY if label in stored else label for label in engine.columns]
+    rows = motion.compute_by_parts(lambda part: force_records(part, motion.system))
+    labels = label_as_opensim(motion.system.columns)
     if analysis.include_constraint_forces and motion.simulation.constraints:
         more, result = recorded(motion)
         labels, rows = labels + more, np.hstack([rows, result])
     tables.add("forces", "ModelForces", labels, rows, description=DESCRIPTION)
+
+
+def force_records(motion: Motion, system: System) -> Array:
+    """Return the force records (t, m) of a motion in the columns of a system; NaN of muscles that are left out.
+
+    Args:
+        motion: at whose states they are.
+        system: with all forces, among them those that the motion leaves out.
+    """
+    result = np.full((len(motion.times), len(system.columns)), np.nan)
+    owners = [element.path for element in system.forces.elements for _ in element.columns]
+    there = [k for k, path in enumerate(owners) if path not in motion.left_out]
+    rows = [motion.system.force_records(t, y) for t, y in motion.moments]
+    result[:, there] = np.array(rows).reshape(len(motion.times), len(there))
+    return result

@@ -116,6 +116,8 @@ def _overridden(analysis: JointReaction, motion: Motion, tables: Tables) -> tupl
         )
         return motion, None
     model.controller_set.objects.clear()
+    # Nobody asks for probes here, and those of muscles would miss what is replaced below.
+    model.probe_set.objects.clear()
     places = {id(force): number for number, force in enumerate(model.force_set.objects)}
     for item in actuators:
         other = ideal(item, 1.0)
@@ -126,7 +128,8 @@ def _overridden(analysis: JointReaction, motion: Motion, tables: Tables) -> tupl
         model.force_set.objects[places[id(item)]] = other
     simulation = simulation_of(tables.job, model)
     forces = {item.name: (table.times, table[item.name]) for item in actuators}
-    controls = driven(simulation.forces.controls, forces, float(motion.times[-1]))
+    first, last = (float(time) for time in motion.times[[0, -1]])
+    controls = driven(simulation.forces.controls, forces, last, start=first, what=f"forces of '{path.name}'")
     simulation.engine.drive(controls)
     pairs = zip(motion.values.tolist(), motion.speeds.tolist(), strict=True)
     return Motion(model, simulation, motion.times, np.array([simulation.state.pack(q, u) for q, u in pairs])), controls

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from osimlite.multibody.spatial import Array
 from osimlite.schema.probes import Probe
 from osimlite.schema.tools.analyses import ProbeReporter
 from osimlite.simulation.files.old_storage import DEGREES
@@ -25,8 +26,14 @@ def compute(analysis: ProbeReporter, motion: Motion, tables: Tables) -> None:
             raise tables.job.unable(
                 f"'{analysis.name}' asks for '{probe.name}', a {type(probe).__name__} that cannot be computed"
             )
-    rows = np.array(list(probe_rows(engine, [*motion.moments], motion.steps))).reshape(len(motion.times), -1)
+    rows = motion.compute_balanced(_rows)
     # Components with outputs are reported in a run, and not here.
     shown = [issubclass(probe.component, Probe) for probe in engine.probes for _ in probe.reading.labels]
     labels = [label for label, is_shown in zip(probe_labels(engine.probes), shown, strict=True) if is_shown]
     tables.add("probes", "ModelProbes", labels, rows[:, shown], description=_DESCRIPTION)
+
+
+def _rows(motion: Motion) -> Array:
+    """Return what all probes report at every time (t, m)."""
+    rows = list(probe_rows(motion.simulation.engine, [*motion.moments], motion.steps))
+    return np.array(rows).reshape(len(motion.times), len(probe_labels(motion.simulation.engine.probes)))

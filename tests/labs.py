@@ -1,0 +1,68 @@
+"""Small lab pipelines of `fixtures/labs`, copied into a folder and changed by tests."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.simulation.files.storage import StoTable, read_sto
+
+LABS = Path(__file__).parents[1] / "fixtures" / "labs"
+
+
+def copy_lab(name: str, folder: Path) -> Path:
+    """Copy one of the pipelines into a folder; return the folder."""
+    shutil.copytree(LABS / name, folder, dirs_exist_ok=True)
+    return folder
+
+
+def change(path: Path, *pairs: tuple[str, str]) -> None:
+    """Replace words of a file; each must be there."""
+    text = path.read_text()
+    for old, new in pairs:
+        assert old in text, old
+        text = text.replace(old, new)
+    path.write_text(text)
+
+
+def run_opensim(setup: Path, results: Path) -> tuple[bool, str]:
+    """Run a setup by OpenSim in a process of its own, from the folder of the setup.
+
+    Args:
+        setup: the file.
+        results: folder of the results.
+
+    Returns:
+        Whether OpenSim says that it worked, and what it logged.
+    """
+    results.mkdir(exist_ok=True)
+    command = [sys.executable, "-W", "ignore", "-c", _RUN, setup.name, str(results)]
+    ended = subprocess.run(command, cwd=setup.parent, capture_output=True, text=True, timeout=300, check=False)
+    log = ended.stdout + ended.stderr
+    return "run: True" in log, log
+
+
+_RUN = """
+import re, sys, opensim
+opensim.Logger.removeFileSink()
+setup, results = sys.argv[1:]
+tag = re.search(r"<(\\w+Tool)\\b", open(setup).read())[1]
+tool = getattr(opensim, tag)(setup)
+if hasattr(tool, "setResultsDir"):
+    tool.setResultsDir(results)
+print("run:", tool.run())
+"""
+
+
+def difference(ours: StoTable | Path, theirs: StoTable | Path) -> float:
+    """Return the largest difference of two tables of the same columns and times, rows without NaN in the first only."""
+    one, two = (read_sto(item) if isinstance(item, Path) else item for item in (ours, theirs))
+    assert one.columns == two.columns
+    assert np.allclose(one.times, two.times, atol=1e-8)
+    known = ~np.isnan(one.rows)
+    assert known.any()
+    return float(np.abs(one.rows - two.rows)[known].max())

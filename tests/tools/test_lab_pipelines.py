@@ -1,0 +1,100 @@
+"""Pipelines of labs: what is said of them, and files in which others look for names."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("scipy", reason="needs scipy (extra 'sim')")
+
+import osimlite
+from osimlite.quantity import DoubtfulWarning
+from osimlite.simulation.files.storage import read_sto
+from tests.cli.command import run
+from tests.labs import change, copy_lab
+
+
+def test_the_moments_without_equilibrium_are_named(tmp_path: Path) -> None:
+    """In words, in JSON, and in the header of each table with NaN."""
+    folder = copy_lab("unbalanced", tmp_path)
+    done = run("run", "ma.xml", "-o", "out", folder=folder)
+    assert done.code == 0
+    assert "at 17 of 51 moments, from 0.62 s to 0.94 s" in " ".join(done.out.split())
+    assert "calf" in (folder / "out" / "ma_MuscleAnalysis_FiberLength.sto").read_text().partition("endheader")[0]
+    assert "NaN" not in (folder / "out" / "ma_MuscleAnalysis_Length.sto").read_text()
+    summary = osimlite.run(folder / "ma.xml", folder / "again").summary
+    assert len(summary["without_equilibrium"]["/forceset/calf"]) == 17
+    json.dumps(summary["without_equilibrium"])
+
+
+def test_states_of_a_file_without_equilibrium(tmp_path: Path) -> None:
+    folder = copy_lab("unbalanced", tmp_path)
+    kinematics = '<Kinematics name="K"/><StatesReporter name="S"/></objects>'
+    change(folder / "kin.xml", ("</objects>", kinematics))
+    states = osimlite.run(folder / "kin.xml", folder / "one").tables["kin_S_states.sto"]
+    assert np.isnan(states.rows).any()
+    (folder / "states.sto").write_bytes((folder / "one" / "kin_S_states.sto").read_bytes().replace(b"nan", b"0.5"))
+    change(
+        folder / "kin.xml",
+        ("<coordinates_file>walk.mot", "<coordinates_file>"),
+        ("<states_file>", "<states_file>states.sto"),
+    )
+    again = osimlite.run(folder / "kin.xml", folder / "two").tables["kin_S_states.sto"]
+    assert np.isnan(again.rows).tolist() == np.isnan(states.rows).tolist()
+
+
+def test_a_muscle_that_never_has_an_equilibrium(tmp_path: Path) -> None:
+    folder = copy_lab("unbalanced", tmp_path)
+    change(folder / "leg.osim", ("<tendon_slack_length>0.40<", "<tendon_slack_length>0.60<"))
+    change(folder / "ma.xml", ("</objects>", '<ForceReporter name="F"/><JointReaction name="J"/></objects>'))
+    tables = osimlite.run(folder / "ma.xml", folder / "out").tables
+    assert np.isnan(tables["ma_MuscleAnalysis_FiberLength.sto"].rows).all()
+    assert np.isfinite(tables["ma_MuscleAnalysis_MomentArm_knee_angle.sto"].rows).all()
+    assert tables["ma_F_forces.sto"].columns == ("calf",)
+    loads = tables["ma_J_ReactionLoads.sto"]
+    points = [label.endswith(("_px", "_py", "_pz")) for label in loads.columns]
+    assert np.isfinite(loads.rows[:, points]).all()
+    assert np.isnan(loads.rows[:, ~np.array(points)]).all()
+
+
+@pytest.mark.parametrize("probe", ["Umberger2010MuscleMetabolicsProbe", "Bhargava2004MuscleMetabolicsProbe"])
+@pytest.mark.parametrize("start", ["0.2", "0.25", "0"])
+def test_given_forces_are_not_doubted(tmp_path: Path, probe: str, start: str) -> None:
+    """Probes of muscles, and forces that cover the analysis but not the time from 0 on, are no reason to warn."""
+    folder = copy_lab("probe", tmp_path)
+    text = (folder / "leg.osim").read_text()
+    assert "Umberger2010MuscleMetabolicsProbe" in text
+    (folder / "leg.osim").write_text(text.replace("Umberger2010MuscleMetabolicsProbe", probe))
+    for setup in ("so.xml", "jr.xml"):
+        change(folder / setup, ("<initial_time>0.2<", f"<initial_time>{start}<"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DoubtfulWarning)
+        first = osimlite.run(folder / "so.xml")
+        result = osimlite.run(folder / "jr.xml")
+    assert "probe" not in str(result.told).lower() + str(first.told).lower()
+
+
+def test_given_forces_that_end_early_are_told(tmp_path: Path) -> None:
+    folder = copy_lab("probe", tmp_path)
+    osimlite.run(folder / "so.xml")
+    change(folder / "jr.xml", ("<final_time>0.4<", "<final_time>0.5<"))
+    with pytest.warns(DoubtfulWarning, match=r"forces of 'so_StaticOptimization_force.sto' .* from 0.2 to 0.4 s"):
+        osimlite.run(folder / "jr.xml")
+
+
+@pytest.mark.parametrize("name", ["lim", "pelvis_limit", "PotentialEnergy"])
+def test_energy_of_limits_has_one_label(tmp_path: Path, name: str) -> None:
+    """StaticOptimization calls it as ForceReporter and OpenSim do, whatever the force is called."""
+    folder = copy_lab("energy", tmp_path)
+    change(folder / "leg.osim", ('name="lim"', f'name="{name}"'))
+    forces = osimlite.run(folder / "so.xml", folder / "out").tables["so_StaticOptimization_force.sto"]
+    reported = osimlite.run(folder / "fr.xml", folder / "out").tables
+    (reporter,) = (table for label, table in reported.items() if label.endswith("_forces.sto"))
+    assert "PotentialEnergy" in forces.columns
+    assert not any("." in label for label in forces.columns)
+    assert forces.columns[: len(reporter.columns)] == reporter.columns
+    assert read_sto(folder / "out" / "so_StaticOptimization_force.sto").columns == forces.columns
