@@ -37,7 +37,7 @@ def run_opensim(setup: Path, results: Path) -> tuple[bool, str]:
         results: folder of the results.
 
     Returns:
-        Whether OpenSim says that it worked, and what it logged.
+        Whether OpenSim says that it worked within a minute of processor time, and what it logged.
     """
     results.mkdir(exist_ok=True)
     command = [sys.executable, "-W", "ignore", "-c", _RUN, setup.name, str(results)]
@@ -47,7 +47,8 @@ def run_opensim(setup: Path, results: Path) -> tuple[bool, str]:
 
 
 _RUN = """
-import re, sys, opensim
+import re, resource, sys, opensim
+resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
 opensim.Logger.removeFileSink()
 setup, results = sys.argv[1:]
 tag = re.search(r"<(\\w+Tool)\\b", open(setup).read())[1]

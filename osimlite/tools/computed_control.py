@@ -177,12 +177,13 @@ class ComputedControl:
 
     # ----------------------------------------------------------------------------------------------- windows
     def follow(self, start: float, y: list[float], end: float, settings: Settings) -> Followed:
-        """Follow the motion from a state to a time."""
+        """Follow the motion from a state to a time; the state need not fulfil the constraints."""
         result = Followed()
         if not self.has_states:
             self.compute(start, start + FIRST_WINDOW, y, result)
             if result.failure:
                 return result
+        y = self._project(start, y)
         result.times.append(start)
         result.states.append(list(y))
 
@@ -211,6 +212,16 @@ class ComputedControl:
                 result.failure = stepper.ended.message
                 return result
             t, y = stepper.time, stepper.state
+        return result
+
+    def _project(self, t: float, y: Sequence[float]) -> list[float]:
+        """Return the nearest state (y,) that fulfils the constraints, first its values, then its speeds."""
+        if not self.simulation.constraints:
+            return list(y)
+        state, mechanism = self.engine.state, self.simulation.mechanism
+        q = mechanism.assemble(np.array(state.values(y)), t)
+        u = mechanism.project_speeds(q, np.array(state.speeds(y)), t)
+        result: list[float] = state.pack(q.tolist(), u.tolist(), y[self._first :])
         return result
 
     def compute(self, t: float, target: float, y: Sequence[float], result: Followed) -> Array:

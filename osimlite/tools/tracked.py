@@ -87,14 +87,15 @@ def _controls(job: Job, sharing: Sharing, model: Model) -> list[Control]:
 
 
 def _first_state(job: Job, simulation: Simulation, desired: Desired, start: float) -> list[float]:
-    """The state (y,) of the motion at a time; fibers are where they were in the default pose."""
+    """Return the state (y,) of the desired motion at a time; fibers are where they were in the default pose.
+
+    Like OpenSim's, it need not fulfil the constraints: only the integration that begins with it projects it. The
+    controls of the first window are computed before, for the desired speeds: without an error of speeds to make up for.
+    """
     in_equilibrium = isinstance(job.setup, RRATool) or job.setup.solve_for_equilibrium_for_auxiliary_states
     default = simulation.initial_state({}, {}, equilibrate=in_equilibrium)
     (wanted,) = desired.at(start)
     q, u = wanted[0], wanted[2]
-    if simulation.constraints:
-        q = simulation.mechanism.assemble(q, start)
-        u = simulation.mechanism.project_speeds(q, u, start)
     return simulation.state.pack(q.tolist(), u.tolist(), default[2 * len(simulation.state.order) :])
 
 

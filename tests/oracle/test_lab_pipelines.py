@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.simulation.files.storage import read_sto
+from osimlite.simulation.files.storage import read_sto, write_sto
 from tests.labs import change, copy_lab, difference, run_opensim
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
@@ -90,3 +90,45 @@ def compare_runs(folder: Path, setup: str, tolerance: float = 2e-6) -> None:
         assert np.allclose(table.times, theirs.times, atol=1e-8)
         scale = np.abs(theirs.rows).max(axis=0)
         assert (np.abs(table.rows - theirs.rows) <= tolerance * scale + 2e-6).all(), name
+
+
+ROD = "</ConstantDistanceConstraint>"
+COUPLER = (
+    ROD
+    + """<CoordinateCouplerConstraint name="both"><coupled_coordinates_function>
+<LinearFunction name="f"><coefficients>1 0</coefficients></LinearFunction></coupled_coordinates_function>
+<independent_coordinate_names>ja_q</independent_coordinate_names>
+<dependent_coordinate_name>jb_q</dependent_coordinate_name></CoordinateCouplerConstraint>"""
+)
+LOOPS = {
+    "as it is": [],
+    "a longer rod": [
+        ("<location_body_2>0 -0.3 0", "<location_body_2>0.1 -0.3 0"),
+        ("<constant_distance>0.4", "<constant_distance>0.5"),
+    ],
+    "a rod and a coupler": [(ROD, COUPLER)],
+    "bars of two lengths": [
+        ("<location_body_1>0 -0.3 0", "<location_body_1>0 -0.25 0"),
+        ("<constant_distance>0.4", "<constant_distance>0.403112887414927"),
+    ],
+}
+
+
+@pytest.mark.parametrize("loop", [*LOOPS])
+def test_closed_loops_are_tracked(tmp_path: Path, loop: str) -> None:
+    folder = copy_lab("loop", tmp_path)
+    change(folder / "bars.osim", *LOOPS[loop])
+    compare_runs(folder, "rra.xml" if loop != "as it is" else "rra2.xml")
+    compare_runs(folder, "cmc.xml")
+
+
+@pytest.mark.parametrize("setup", ["rra.xml", "cmc.xml"])
+def test_a_motion_off_the_constraints_is_tracked(tmp_path: Path, setup: str) -> None:
+    """The first controls are those of the desired speeds, before the start is projected onto the constraints."""
+    folder = copy_lab("loop", tmp_path)
+    table = read_sto(folder / "walk.mot")
+    rows = table.rows.copy()
+    rows[:, 1] += 3.0 * np.sin(5.0 * table.times + 1.0)
+    (folder / "walk.mot").unlink()
+    write_sto(folder / "walk.mot", "m", table.times.tolist(), table.columns, rows.tolist(), in_degrees=True)
+    compare_runs(folder, setup)
