@@ -1,6 +1,8 @@
 """The notebooks of the manual as pages with all that they show: executed when the site is built.
 
 A hook of MkDocs. Outputs are put into the pages when these are HTML already: nothing in them is Markdown.
+The environment variable ``OSIMLITE_MANUAL=quick`` builds the site without executing anything, for the checks of every
+push.
 """
 
 from __future__ import annotations
@@ -23,11 +25,15 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 FOLDER = Path(__file__).parent / "notebooks"
-MODELS = (FOLDER, Path(__file__).parents[2] / "shared" / "corpus" / "models" / "m0014")
+SHARED = Path(os.environ.get("OSIMLITE_SHARED") or Path(__file__).parents[2] / "shared")
+MODELS = (FOLDER, SHARED / "corpus" / "models" / "m0014")
 """Where the models that notebooks need are looked for."""
 
 KERNELS = 2
 """How many notebooks are executed at a time."""
+
+EXECUTE = os.environ.get("OSIMLITE_MANUAL") != "quick"
+"""Whether notebooks are executed, and the pictures of the gallery made."""
 
 _outputs: dict[str, str] = {}
 """HTML of what cells show, by the text that stands for it in the pages."""
@@ -37,7 +43,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add a page for each notebook."""
     notebooks = sorted(FOLDER.glob("*.ipynb"))
     with ThreadPoolExecutor(KERNELS) as pool:
-        for path, notebook in zip(notebooks, pool.map(executed, notebooks), strict=True):
+        for path, notebook in zip(notebooks, pool.map(executed if EXECUTE else read, notebooks), strict=True):
             text = "\n\n".join(parts(path, notebook))
             files.append(File.generated(config, f"notebooks/{path.stem}.md", content=text))
     return files
@@ -55,9 +61,14 @@ def on_page_content(html: str, **_: Any) -> str:
     return re.sub(r"<p>(output \S+ \d+ \d+)</p>", lambda match: _outputs[match[1]], html)
 
 
+def read(path: Path) -> Any:
+    """Read a notebook."""
+    return nbformat.read(path, as_version=4)
+
+
 def executed(path: Path) -> Any:
     """A notebook with its outputs, run in a folder of its own; without them if there is no model that it needs."""
-    notebook = nbformat.read(path, as_version=4)
+    notebook = read(path)
     needed = notebook.metadata.get("needs", [])
     found = [folder / name for name in needed for folder in MODELS if (folder / name).exists()]
     if len(found) == len(needed):
@@ -93,7 +104,8 @@ def parts(path: Path, notebook: Any) -> Iterator[str]:
         if number == 0:
             yield f"This page is [a notebook]({path.name}), as it was executed when the manual was built."
     if not any(cell.get("outputs") for cell in notebook.cells):
-        yield f"*It was not executed this time, since it needs {', '.join(notebook.metadata['needs'])}.*"
+        needed = notebook.metadata.get("needs", [])
+        yield f"*It was not executed this time{', since it needs ' * bool(needed)}{', '.join(needed)}.*"
 
 
 def _html(output: Any) -> str:

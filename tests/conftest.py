@@ -20,7 +20,7 @@ pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).resolve().parent.parent
 # Reference data too large to commit. It stands beside the repository; tests that need it skip without it.
-SHARED = ROOT.parent / "shared"
+SHARED = Path(os.environ.get("OSIMLITE_SHARED") or ROOT.parent / "shared")
 NO_SHARED = "needs the shared reference folder, which is not beside this repository"
 ROUNDED = {"m0079": 1e-6, "m0109": 1e-7, "m0168": 1e-7, "m0172": 1e-8}
 """How near poses of corpus models are to those on record, which are of files that hold more digits than OpenSim

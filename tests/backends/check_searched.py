@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import casadi
 import numpy as np
 import pytest
@@ -15,8 +13,9 @@ from osimlite.forces.bezier import curve, curve_value
 from osimlite.models.jumper import jumper
 from osimlite.multibody.functions import Constant
 from tests.backends.machine import Beside, off
+from tests.conftest import SHARED
 
-CORPUS = Path(__file__).resolve().parents[3] / "shared" / "corpus" / "models"
+CORPUS = SHARED / "corpus" / "models"
 GAIT = CORPUS / "m0005"
 
 

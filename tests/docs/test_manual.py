@@ -27,6 +27,12 @@ from osimlite.cli import main
 ROOT = Path(__file__).resolve().parents[2]
 # What makes the pictures of the gallery is run when the site is built.
 PAGES = sorted({path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").rglob("*.md")} - {"docs/gallery.md"})
+QUICK = (
+    "adoption", "compiled", "constraints", "errors", "format-and-diff", "from-mujoco", "from-urdf", "integrators",
+    "lint-in-ci", "modifying", "plugin-classes", "rules", "urdf", "yaml",
+)  # fmt: skip
+"""Pages whose blocks take a second or two at most: the quick suite runs these, and reads all others
+(tests/docs/test_names_used.py)."""
 READ_ONLY = ("", "text", "lua", "elisp", "console", "diff", "matlab")
 """Languages of blocks that show what others print, or that nothing here reads."""
 
@@ -67,7 +73,13 @@ def shell(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
 
 
 @pytest.mark.skipif(os.name == "nt", reason="blocks of commands are for bash")
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize(
+    "page",
+    [
+        page if page.startswith(tuple(f"docs/{name}" for name in QUICK)) else pytest.param(page, marks=pytest.mark.full)
+        for page in PAGES
+    ],
+)
 def test_every_block_runs(page: str, tmp_path: Path, shell: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
     for package in ("numba", "matplotlib"):
         pytest.importorskip(package, reason=f"needs {package} (extra 'all')")

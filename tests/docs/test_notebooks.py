@@ -31,7 +31,9 @@ def test_all_are_listed() -> None:
     assert {path.stem for path in FOLDER.glob("*.ipynb")} == {*SHOWN}
 
 
-@pytest.mark.parametrize("name", SHOWN)
+@pytest.mark.parametrize(
+    "name", ["lint", *(pytest.param(name, marks=pytest.mark.full) for name in SHOWN if name != "lint")]
+)
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::RuntimeWarning")
 def test_it_runs(name: str) -> None:
     nbformat, notebooks = import_module("nbformat"), import_module("docs._notebooks")
