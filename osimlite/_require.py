@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from types import ModuleType
 
 from osimlite.errors import MissingDependency
@@ -29,9 +34,12 @@ def require(module: str, *, extra: str, purpose: str, instead: str = "") -> Modu
         MissingDependency: the package is absent, or present and cannot be loaded.
     """
     package = module.partition(".")[0]
+    if (loaded := sys.modules.get(module)) is not None:
+        return loaded
     cure = (f"take {instead}, or " if instead else "") + f"run: pip install 'osimlite[{extra}]'"
     try:
-        return import_module(module)
+        with away_from_current_folder():
+            return import_module(module)
     except ModuleNotFoundError as error:
         if error.name == package:
             raise MissingDependency(f"{purpose} needs {package}, which is not installed; {cure}") from error
@@ -42,3 +50,45 @@ def require(module: str, *, extra: str, purpose: str, instead: str = "") -> Modu
         raise MissingDependency(
             f"{purpose} needs {package}, which is installed but cannot be loaded ({error}); reinstall it, or {cure}"
         ) from error
+
+
+SAFE_PATH = "PYTHONSAFEPATH"
+"""Environment variable by which Python finds no modules in the folder that it is started in."""
+
+
+def protect_processes() -> None:
+    """Let no Python process that this one starts find modules in the current folder.
+
+    The folder may be a stranger's, and packages start processes of their own: glfw, which mujoco
+    imports, runs `python -c` without `-P`.
+    """
+    os.environ.setdefault(SAFE_PATH, "1")
+
+
+@contextmanager
+def away_from_current_folder() -> Iterator[None]:
+    """Import packages from a folder that nobody else has filled.
+
+    Some look for files in the current folder while they are loaded: glfw for libraries, numba for
+    `.numba_config.yaml`, matplotlib for `matplotlibrc`.
+    """
+    before = os.environ.get(SAFE_PATH)
+    try:
+        folder = os.getcwd()
+    except OSError:
+        # It was removed, so that nothing is in it.
+        yield
+        return
+    os.environ[SAFE_PATH] = "1"
+    path = list(sys.path)
+    # An empty entry means the current folder, whichever that is.
+    away = [os.path.abspath(entry) for entry in path if entry not in ("", ".")]
+    sys.path[:] = away
+    os.chdir(Path(__file__).parent)
+    try:
+        yield
+    finally:
+        os.chdir(folder)
+        sys.path[:] = [*(entry for entry in sys.path if entry not in away), *path]
+        if before is None:
+            del os.environ[SAFE_PATH]

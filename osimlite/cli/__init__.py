@@ -92,8 +92,10 @@ def main(arguments: list[str] | None = None) -> None:
 
     Exits with 0 (done), 1 (the answer is no), 2 (could not be carried out) or 130 (interrupted).
     """
+    from osimlite._require import protect_processes
     from osimlite.cli._console import guarded_output
 
+    protect_processes()
     with guarded_output():
         _run(sys.argv[1:] if arguments is None else arguments)
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from osimlite._cores import cores
+from osimlite._require import SAFE_PATH
 from osimlite.cli._command import Argument, command
 from osimlite.cli._console import add_row, plain_console, plain_table, say
 from osimlite.cli._progress import progress_bar
@@ -184,7 +185,14 @@ def examine(name: str) -> Package:
     named = name.lower().replace("-", "_")
     main = named if named in modules else next(module for module in modules if not module.startswith("_"))
     # -P: what lies in the current folder is not what was installed.
-    done = subprocess.run([sys.executable, "-P", "-c", f"import {main}"], capture_output=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", f"import {main}"],
+        capture_output=True,
+        check=False,
+        # Packages start processes and look for libraries in the current folder.
+        cwd=Path(__file__).parent,
+        env={**os.environ, SAFE_PATH: "1"},
+    )
     if done.returncode == 0:
         return Package(name, version, "")
     words = done.stderr.decode(errors="replace").strip().splitlines() or [f"its process ended with {done.returncode}"]

@@ -55,6 +55,13 @@ class Surface:
         return "\n".join(lines) + "\n"
 
 
+MAX_EAR_WORK = 250_000
+"""Sum of the squares of the corners of polygons that are cut at their ears, which takes ten seconds at most.
+
+Polygons beyond that are cut from one corner, which is right of convex ones. Meshes of bones have
+triangles; a polygon of a million corners would take years."""
+
+
 def triangulated(points: Array, corners: Indices, ends: Indices) -> Indices:
     """Triangles (t, 3) that cover polygons, turning the same way.
 
@@ -69,9 +76,12 @@ def triangulated(points: Array, corners: Indices, ends: Indices) -> Indices:
     quads = corners[starts[sizes == 4][:, None] + np.arange(4)]
     if len(quads):
         parts.append(_halves(points, quads))
+    work = 0
     for start, end in zip(starts[sizes > 4].tolist(), ends[sizes > 4].tolist(), strict=True):
         polygon = corners[start:end]
-        parts.append(polygon[_ears(points[polygon])])
+        work += (end - start) ** 2
+        cut = _ears if work <= MAX_EAR_WORK else _fan
+        parts.append(polygon[cut(points[polygon])])
     return np.concatenate(parts).reshape(-1, 3)
 
 
@@ -88,6 +98,12 @@ def _halves(points: Array, quads: Indices) -> Indices:
     agreement = np.einsum("ij,ij->i", np.cross(b - a, c - a), np.cross(c - a, d - a))
     cut = np.where((agreement < 0.0)[:, None], (1, 2, 3, 1, 3, 0), (0, 1, 2, 0, 2, 3))
     return np.take_along_axis(quads, cut, axis=1).reshape(-1, 3)
+
+
+def _fan(corners: Array) -> Indices:
+    """Return triangles (k - 2, 3) of a polygon of k corners (k, 3) from its first corner to all others."""
+    others = np.arange(1, len(corners) - 1)
+    return np.stack([np.zeros_like(others), others, others + 1], axis=1)
 
 
 def _ears(corners: Array) -> Indices:

@@ -22,9 +22,31 @@ from numpy.typing import NDArray
 from osimlite.errors import OsimliteError
 from osimlite.meshes.surface import Array, Indices, Polygons, Surface, strip_triangles, triangulated
 
-_DECOMPRESS: dict[str, Callable[[bytes], bytes]] = {
-    "vtkZLibDataCompressor": zlib.decompress,
-    "vtkLZMADataCompressor": lzma.decompress,
+MAX_BYTES = 400_000_000
+"""Bytes of all numbers of a file, decompressed. A mesh of a million points has about 50 MB of them."""
+
+
+def _inflated(block: bytes, size: int) -> bytes:
+    """Decompress a block of zlib to at most `size` bytes; ValueError if there is more."""
+    stream = zlib.decompressobj()
+    data = stream.decompress(block, size + 1)
+    if len(data) > size or not stream.eof:
+        raise ValueError
+    return data
+
+
+def _expanded(block: bytes, size: int) -> bytes:
+    """Decompress a block of LZMA to at most `size` bytes; ValueError if there is more."""
+    stream = lzma.LZMADecompressor(memlimit=MAX_BYTES)
+    data = stream.decompress(block, size + 1)
+    if len(data) > size or not stream.eof:
+        raise ValueError
+    return data
+
+
+_DECOMPRESS: dict[str, Callable[[bytes, int], bytes]] = {
+    "vtkZLibDataCompressor": _inflated,
+    "vtkLZMADataCompressor": _expanded,
 }
 
 _TYPES = {
@@ -74,7 +96,7 @@ def _named(name: str) -> Iterator[None]:
 
 class _File:
     def __init__(self, content: bytes, *, all_digits: bool = False) -> None:
-        self.all_digits = all_digits
+        self.all_digits, self.left = all_digits, MAX_BYTES
         # What is appended may be no XML at all, so it is cut out before the rest is read.
         self.appended = b""
         mark = content.find(b"<AppendedData")
@@ -191,6 +213,8 @@ class _File:
                 case _:
                     raise _Unreadable(f"it has numbers in the format '{form}'")
             return np.frombuffer(data, dtype)
+        except MemoryError:
+            raise _Unreadable(f"its numbers named '{array.get('Name', '')}' need more memory than there is") from None
         except (ValueError, IndexError, OverflowError, binascii.Error, zlib.error, lzma.LZMAError):
             raise _Unreadable(f"its numbers named '{array.get('Name', '')}' are damaged or cut off") from None
 
@@ -202,11 +226,18 @@ class _File:
         part = self.appended[offset:end]
         return part if self.raw else _base64(part)
 
+    def _take(self, count: int) -> None:
+        """Count bytes of numbers; several arrays may be made of the same bytes of the file."""
+        self.left -= count
+        if self.left < 0:
+            raise _Unreadable(f"it has more than {MAX_BYTES / 1e6:g} MB of numbers")
+
     def _payload(self, stream: bytes) -> bytes:
         """What a block of bytes holds after its header, decompressed."""
         width = self.header.itemsize
         if not self.compressor:
             size = int(np.frombuffer(stream, self.header, 1)[0])
+            self._take(min(size, len(stream)))
             data = stream[width : width + size]
             if len(data) != size:
                 raise ValueError
@@ -217,9 +248,11 @@ class _File:
         if not blocks:
             return b""
         _, whole, last, *sizes = np.frombuffer(stream, self.header, 3 + blocks).tolist()
+        # The size that is promised decides before anything is decompressed; no block may be longer.
+        self._take(whole * (blocks - bool(last)) + last)
         place, parts = (3 + blocks) * width, []
         for size in sizes:
-            parts.append(_DECOMPRESS[self.compressor](stream[place : place + size]))
+            parts.append(_DECOMPRESS[self.compressor](stream[place : place + size], max(whole, last)))
             place += size
         # A last block that is as long as the others is written as having length zero.
         if sum(map(len, parts)) != whole * (blocks - bool(last)) + last:

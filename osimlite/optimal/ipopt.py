@@ -125,8 +125,10 @@ def solve(
         near: whether the guess is nearly a solution, so that it is not moved away from its bounds.
     """
     search = _Search(program, tell)
+    # Without a name Ipopt reads no file of options. By default it reads `ipopt.opt` in the current folder, which may
+    # name a file to write to and a library to load.
     options = {
-        "ipopt": _options(program) | (NEARLY if near else {}) | {"print_level": 0, "sb": "yes"},
+        "ipopt": _options(program) | (NEARLY if near else {}) | {"print_level": 0, "sb": "yes", "option_file_name": ""},
         "print_time": False,
         "show_eval_warnings": False,
         "no_nlp_grad": True,

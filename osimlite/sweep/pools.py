@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 import osimlite
 from osimlite._cores import cores
-from osimlite._require import require
+from osimlite._require import protect_processes, require
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.sweep.plan import Plan
 from osimlite.sweep.runner import Block, Runner
@@ -174,6 +174,7 @@ class ProcessPool(_LocalPool):
     """Processes, for what keeps Python's lock."""
 
     def __init__(self, work: Callable[[Any], Any], count: int) -> None:
+        protect_processes()
         # Windows can wait for no more. Ctrl-C is for the process that gives out the work.
         executor = ProcessPoolExecutor(min(count, 61), get_context("spawn"), _leave_sigint)
         super().__init__(executor, work, count)

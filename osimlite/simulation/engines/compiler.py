@@ -37,6 +37,11 @@ from numba.extending import intrinsic  # noqa: E402
 
 from osimlite.simulation.engines import tangents  # noqa: E402
 
+if hasattr(numba.core.config, "_config_fname"):
+    # numba reads `.numba_config.yaml` in the current folder again before each compilation; the folder may be a
+    # stranger's, and the file decides what is compiled and where it is cached.
+    numba.core.config._config_fname = ""
+
 POINTERS: dict[str, Any] = {
     "Floats": types.CPointer(types.float64),  # type: ignore[no-untyped-call]
     "Ints": types.CPointer(types.int64),  # type: ignore[no-untyped-call]

@@ -5,21 +5,34 @@ Everything is in the axes of the file, which often are not those of a model, who
 
 from __future__ import annotations
 
-from importlib import import_module
+import io
+import json
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from osimlite._require import SAFE_PATH
 from osimlite.errors import DocumentError, MissingDependency
 from osimlite.files import read_file
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.files.storage import StoTable
-from osimlite.tables import METRES
 
 ENDING = ".c3d"
-MOMENTS = {"nm": 1.0, "n.m": 1.0, "nmm": 0.001, "n.mm": 0.001}
-"""Units of moments in N·m."""
+
+SECONDS = 2
+"""Processor time of reading a small file, with loading numpy; large ones get more by their size."""
+
+BYTES_PER_SECOND = 2_000_000
+"""Of a file, at least so much is read in a second; it is about 50 times as much where nothing is wrong."""
+
+PATIENCE = 30
+"""The process may wait so many times its processor time for a processor."""
+
+PROGRAM = "import sys; sys.path[:0] = sys.argv[3:]; from osimlite.simulation.files.c3d_process import serve; serve()"
 
 
 def read_c3d_markers(path: str | Path) -> tuple[tuple[str, ...], Array, Array]:
@@ -30,13 +43,8 @@ def read_c3d_markers(path: str | Path) -> tuple[tuple[str, ...], Array, Array]:
         DocumentError: it is no .c3d file.
         MissingDependency: ezc3d is not installed.
     """
-    result = _opened(path)
-    points = result["parameters"]["POINT"]
-    unit = METRES.get(points["UNITS"]["value"][0].strip().lower(), 0.001)
-    names = tuple(name for key, more in points.items() if key.startswith("LABELS") for name in more["value"])
-    positions = np.moveaxis(result["data"]["points"][:3], (2, 1, 0), (0, 1, 2))
-    times = _start(result) + np.arange(len(positions)) / result["header"]["points"]["frame_rate"]
-    return names[: positions.shape[1]], times, unit * positions
+    arrays = _read_apart(path, "markers")
+    return tuple(arrays["names"].tolist()), arrays["times"], arrays["positions"]
 
 
 def read_c3d_forces(path: str | Path) -> StoTable:
@@ -50,37 +58,56 @@ def read_c3d_forces(path: str | Path) -> StoTable:
         DocumentError: it is no .c3d file, or it has no force plates.
         MissingDependency: ezc3d is not installed.
     """
-    result = _opened(path, extract_forceplat_data=True)
-    plates = result["data"]["platform"]
-    if not plates:
+    arrays = _read_apart(path, "forces")
+    if not len(arrays["names"]):
         raise DocumentError("the file has no force plates", file=str(path))
-    columns, rows = list[str](), list[Array]()
-    for number, plate in enumerate(plates, start=1):
-        length = METRES.get(plate["unit_position"].strip().lower(), 0.001)
-        middle = np.repeat(length * plate["corners"].mean(axis=1)[:, None], plate["force"].shape[1], axis=1)
-        moment = MOMENTS.get(plate["unit_moment"].strip().lower(), 0.001) * plate["moment"]
-        for letter, values in (("f", plate["force"]), ("p", middle), ("m", moment)):
-            columns += [f"{letter}{number}_{axis}" for axis in "xyz"]
-            rows += list(values)
-    times = _start(result) + np.arange(len(rows[0])) / result["header"]["analogs"]["frame_rate"]
-    return StoTable("forces", times, tuple(columns), np.stack(rows, axis=1), file=str(path))
+    return StoTable("forces", arrays["times"], tuple(arrays["names"].tolist()), arrays["rows"], file=str(path))
 
 
-def _opened(path: str | Path, **options: bool) -> Any:
-    read_file(path)
-    try:
-        return import_module("ezc3d").c3d(str(path), **options)
-    except ImportError:
+def _read_apart(path: str | Path, what: str) -> dict[str, Array]:
+    """Return the arrays that a process of its own reads from a file.
+
+    Damaged files make ezc3d 1.6 write beyond its memory (a process ends by SIGSEGV), or loop without
+    end: it may do so where nothing else is lost, and for a limited time.
+
+    Args:
+        path: of the file.
+        what: ``markers`` or ``forces``.
+    """
+    size = len(read_file(path))
+    # A name in sys.modules that is None, or a package that is not there.
+    if sys.modules.get("ezc3d", ...) is None or find_spec("ezc3d") is None:
         raise MissingDependency(
             "a .c3d file is read by ezc3d, which is not installed; run: pip install ezc3d, or pip install "
             "'osimlite[c3d]'",
             file=str(path),
-        ) from None
-    except (OSError, RuntimeError, ValueError) as error:
-        raise DocumentError(f"the file cannot be read: {error}", file=str(path)) from None
+        )
+    seconds = SECONDS + size // BYTES_PER_SECOND
+    package = str(Path(__file__).parents[3])
+    command = [sys.executable, "-P", "-c", PROGRAM, what, os.path.abspath(path), str(seconds), package]
+    try:
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=PATIENCE * seconds,
+            check=False,
+            cwd=Path(__file__).parent,
+            env={**os.environ, SAFE_PATH: "1", "OPENBLAS_NUM_THREADS": "1"},
+        )
+    except subprocess.TimeoutExpired:
+        raise DocumentError("the file cannot be read: reading it does not end", file=str(path)) from None
+    except OSError as error:
+        raise DocumentError(f"no process can be started that reads it: {error}", file=str(path)) from None
+    if done.returncode != 0:
+        raise DocumentError(f"the file cannot be read: {_reason(done)}", file=str(path))
+    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:
+        return dict(arrays)
 
 
-def _start(found: Any) -> float:
-    """The time of the first frame, s."""
-    points = found["header"]["points"]
-    return float(points["first_frame"] / points["frame_rate"])
+def _reason(done: subprocess.CompletedProcess[bytes]) -> str:
+    """Return why a process has read nothing, by what it has left."""
+    try:
+        return str(json.loads(done.stdout)["error"])
+    except (ValueError, KeyError, TypeError):
+        return "it is damaged, so that reading it ends in a crash or takes too long"
