@@ -62,6 +62,12 @@ def test_what_cannot_be_translated_is_named():
     assert caught.value.line == list_numbers.__code__.co_firstlineno + 2
 
 
+def twice(a: float) -> float:
+    """A kernel that shares nothing with another."""
+    return 2.0 * a
+
+
 def test_units_share_the_kernels():
-    units = write_units({"one": (branch, 0), "two": (branch, 0)}, 2)
+    units = write_units({"one": (branch, 0), "two": (twice, 4)}, 3)
     assert [unit.count("OSIMLITE_EXPORT") for unit in units] == [1, 1]
+    assert "Dual<4> two(Dual<4> a)" in units[1]

@@ -332,7 +332,8 @@ class ExpressionWriter:
         if constant is not None:
             return Code(self.item(self.text(owner, PRIMARY), kind, constant))
         texts = self.ordered([owner, index], lambda part: self.text(part, PRIMARY if part is owner else CHOICE))
-        return Code(f"{texts[0]}.items[py::wrap_index({texts[1]}, {len(kind.parts)})]")
+        # A variable index counts from the start: a test whether it is negative costs more than the laws' curves may.
+        return Code(f"{texts[0]}.items[{texts[1]}]")
 
     def _operand(self, node: ast.expr, op: ast.operator, is_right: bool) -> str:
         if type(op) in FUNCTIONS:

@@ -92,12 +92,9 @@ inline double power(double base, double exponent) { return std::pow(base, expone
 
 // Beyond the range of integers C++ leaves open what comes out; here it is the nearest integer, and 0 for NaN.
 inline int64_t to_integer(double x) {
-    if (x >= 9223372036854775808.0) return INT64_MAX;
-    if (x < -9223372036854775808.0) return INT64_MIN;
-    return x == x ? static_cast<int64_t>(x) : 0;
+    if (std::fabs(x) < 9223372036854775808.0) return static_cast<int64_t>(x);
+    return x > 0.0 ? INT64_MAX : x < 0.0 ? INT64_MIN : 0;
 }
-
-inline int64_t wrap_index(int64_t index, int64_t count) { return index < 0 ? index + count : index; }
 
 inline int64_t abs(int64_t x) { return x < 0 ? static_cast<int64_t>(0 - static_cast<uint64_t>(x)) : x; }
 inline double abs(double x) { return std::fabs(x); }
