@@ -50,6 +50,13 @@ ENGINES = {"bullet": "pybullet", "compiled": "numba"}
 """Package of each engine."""
 
 
+QUICK_CORPUS = {
+    "m0072", "m0093", "m0113", "m0117", "m0119", "m0123", "m0134", "m0139", "m0153", "m0166", "m0178", "m0181", "m0321",
+    "m0356", "m0459", "m0466", "m0472", "m0713",
+}  # fmt: skip
+"""Real files of the quick suite: the smallest that together have three quarters of all classes in the corpus."""
+
+
 class CorpusModel(NamedTuple):
     """One real model file, with what OpenSim 4.6 makes of it."""
 
@@ -71,9 +78,12 @@ def corpus_models() -> list[CorpusModel]:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Run a test that asks for `corpus_model` once per real file."""
+    """Run a test that asks for `corpus_model` once per real file; the quick suite takes some of the files."""
     if "corpus_model" in metafunc.fixturenames:
-        models: list[object] = [pytest.param(model, id=model.id) for model in corpus_models()]
+        models: list[object] = [
+            pytest.param(model, id=model.id, marks=() if model.id in QUICK_CORPUS else pytest.mark.full)
+            for model in corpus_models()
+        ]
         absent = pytest.param(None, id="absent", marks=pytest.mark.skip(reason=NO_SHARED))
         metafunc.parametrize("corpus_model", models or [absent])
 

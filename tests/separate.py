@@ -24,6 +24,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 _SERVER = "osimlite-check-server"
+_DIST = "osimlite-dist"
 
 
 class ServerDiedError(Exception):
@@ -80,6 +81,7 @@ class Checks:
     def __init__(self, config: pytest.Config) -> None:
         self.config = config
         self._server: CheckServer | None = None
+        self._collected: dict[Path, list[dict[str, Any]]] = {}
         self._reports: dict[str, list[Any]] = {}
         self._requested: set[str] = set()
         self._running: Iterator[Any] = iter(())
@@ -90,6 +92,11 @@ class Checks:
         if self._server is None:
             self._server = CheckServer(self.config.rootpath)
         return self._server
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_configure_node(self, node: Any) -> None:
+        """Tell a worker of pytest-xdist how tests are distributed: its own option says that they are not."""
+        node.workerinput[_DIST] = self.config.getoption("dist")
 
     @pytest.hookimpl(wrapper=True)
     def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> Generator[None, Any, Any]:
@@ -105,15 +112,20 @@ class Checks:
         Raises:
             CollectError: the file cannot be imported, for example.
         """
-        try:
-            answers = list(self.server.ask("--collect-only", "--full", str(path)))
-        except ServerDiedError as error:
-            self.drop_server()
-            raise pytest.Collector.CollectError(str(error)) from None
-        for answer in answers:
+        if path not in self._collected:
+            # All files of a folder at once: each call of pytest takes half a second.
+            files = sorted(path.parent.glob("check_*.py"))
+            self._collected.update({file: [] for file in files})
+            try:
+                for answer in self.server.ask("--collect-only", "--full", *map(str, files)):
+                    self._collected[Path(answer["path"])].append(answer)
+            except ServerDiedError as error:
+                self.drop_server()
+                raise pytest.Collector.CollectError(str(error)) from None
+        for answer in self._collected[path]:
             if "error" in answer:
                 raise pytest.Collector.CollectError(answer["error"])
-        return answers
+        return self._collected[path]
 
     def reports(self, item: CheckItem) -> list[Any]:
         """Return pytest's reports of one test: run it, or wait for it where its file is being run."""
@@ -134,7 +146,7 @@ class Checks:
 
     def _with(self, item: CheckItem) -> list[pytest.Item]:
         """Return a test and all others that this process will run of its file."""
-        if getattr(self.config, "workerinput", None) and self.config.getoption("dist", "no") != "loadfile":
+        if getattr(self.config, "workerinput", {_DIST: "loadfile"})[_DIST] not in ("loadfile", "loadscope"):
             # Other workers run some of the others.
             return [item]
         return [other for other in item.session.items if isinstance(other, CheckItem) and other.path == item.path]
@@ -242,12 +254,14 @@ class Answers:
         if session.config.option.collectonly:
             for item in session.items:
                 marks = sorted({mark.name for mark in item.iter_markers()} & {"full", "oracle", "corpus"})
-                self.write({"name": item.name, "line": item.location[1] or 0, "marks": marks})
+                self.write({"path": str(item.path), "name": item.name, "line": item.location[1] or 0, "marks": marks})
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         """Write why a file cannot be collected."""
         if report.failed:
-            self.write({"error": str(report.longrepr)})
+            assert self.config is not None
+            path = self.config.rootpath / report.nodeid.partition("::")[0]
+            self.write({"path": str(path), "error": str(report.longrepr)})
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Write the report of one phase of one test."""

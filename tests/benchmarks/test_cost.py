@@ -80,6 +80,7 @@ def test_the_file_holds_what_was_accepted(tmp_path: Path, monkeypatch: pytest.Mo
     assert not compared(read, given, same_versions=True)
 
 
+@pytest.mark.full
 @pytest.mark.skipif(sys.platform != "linux", reason="counted on Linux")
 @pytest.mark.skipif(not cost.ACCEPTED.exists(), reason="no costs are accepted yet")
 def test_no_action_became_dearer() -> None:

@@ -76,6 +76,12 @@ EXAMPLES = {
     "optimize": "optimize w.osim --objective distance --vary RHip_rz=0:1 --vary LHip_rz=0:1 --budget 8 --to 0.005",
 }
 
+SLOW = {
+    "gait", "optimize", "simulate --animate", "simulate --engine bullet", "simulate --plot", "sweep",
+    "view --screenshot",
+}  # fmt: skip
+"""Uses that the full suite tries: each starts several processes that load large libraries."""
+
 SCRIPT = """
 import sys
 from importlib.machinery import PathFinder
@@ -110,7 +116,7 @@ def call(words: str, absent: set[str], folder: Path) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-@pytest.mark.parametrize("use", EXAMPLES)
+@pytest.mark.parametrize("use", [pytest.param(use, marks=pytest.mark.full) if use in SLOW else use for use in EXAMPLES])
 def test_what_is_needed_is_enough_and_is_needed(work: Path, use: str) -> None:
     every = {MODULES.get(name, name) for names in NEEDS.values() for name in names} | {"scipy", "distributed"}
     needed = {MODULES.get(name, name) for name in NEEDS[use]}

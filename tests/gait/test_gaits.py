@@ -87,6 +87,7 @@ def test_the_files_tell_what_was_found_and_how(found):
     assert heads.split(",")[:3] == [INERTIA, AHEAD, "largest_multiplier"] and len(rows) == gait.cycles
 
 
+@pytest.mark.full
 def test_another_walker_is_spared_unless_forced_and_the_same_seed_finds_the_same(found, tmp_path):
     gait, folder, _ = found
     before = {path.name: path.read_bytes() for path in folder.iterdir()}

@@ -12,6 +12,7 @@ pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 import osimlite.gym  # noqa: E402, F401
 
 
+@pytest.mark.full
 def test_the_arm_learns_to_hold_the_weight() -> None:
     envs = gymnasium.make_vec("osimlite/Arm-v0", num_envs=4)
     size = envs.single_observation_space.shape[0]

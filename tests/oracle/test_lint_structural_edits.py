@@ -20,10 +20,11 @@ import pytest
 from osimlite.lint import Finding, Report, validate
 from tests.conftest import CorpusModel
 from tests.oracle.structural_edits import Text, edits
+from tests.suite import choose
 
 pytestmark = pytest.mark.oracle
 
-WANTED = int(os.environ.get("OSIMLITE_EDITS", "100"))
+WANTED = int(os.environ.get("OSIMLITE_EDITS", choose("20", "100")))
 # Of the hundred; whoever asks for more waits for them, and for the large models.
 SECONDS = 60 if "OSIMLITE_EDITS" not in os.environ else 7200
 LARGEST = 150_000 if "OSIMLITE_EDITS" not in os.environ else 10_000_000

@@ -24,10 +24,11 @@ from tests.lint.project_faults import UNKNOWABLE, faults
 from tests.lint.projects import Fault, Project, pendulum, walking
 from tests.lint.test_random_faults import Folder, in_place
 from tests.oracle.opensim_tools import LOG
+from tests.suite import choose
 
 pytestmark = pytest.mark.oracle
 
-WANTED = int(os.environ.get("OSIMLITE_FAULTS", "20"))
+WANTED = int(os.environ.get("OSIMLITE_FAULTS", choose("8", "40")))
 SEED = int(os.environ.get("OSIMLITE_SEED", "1"))
 VERDICTS = ("hangs", "crashes", "raises", "false", "changes", "tells", "nothing")
 """What OpenSim may do, the worst first."""
