@@ -42,6 +42,10 @@ class UnitWarning(DoubtfulWarning):
     """A number without a unit was hardly meant in rad."""
 
 
+class DeprecatedWarning(DoubtfulWarning, DeprecationWarning):
+    """A name or an option still works, and will be removed; commands print it as a line on standard error."""
+
+
 class DocumentError(OsimliteError):
     """A file cannot be read as what it should be. `meant` is the tag that would be right there, if that is known."""
 

@@ -36,8 +36,8 @@ StartSpeed = Annotated[
 ]
 To = Annotated[float, Option("--to", metavar="SECONDS", help="How long to simulate.")]
 Engine = Annotated[
-    str,
-    Option(help="What computes the accelerations: 'bullet', 'compiled', or 'auto': the first that is installed."),
+    str | None,
+    Option(help="What computes the accelerations: 'compiled' or 'bullet' (PyBullet).", show_default="compiled"),
 ]
 FirstFrame = Annotated[
     float, Option("--from", metavar="SECONDS", help="Time of the first frame that counts.", show_default="the first")

@@ -22,6 +22,12 @@ if TYPE_CHECKING:
     from osimlite.reflexes.scenario import Scenario
     from osimlite.simulation.trajectory import Trajectory
 
+ACCURACY = 1e-5
+"""Accuracy of the integrator in all motions of the tour."""
+
+REPORT_INTERVAL_S = 0.01
+"""Time between the rows of the motions of the tour."""
+
 MISSPELT = ("<geometry>RFootContact ", "<geometry>RFootContct ")
 
 
@@ -143,12 +149,15 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
             tell(f"{listed(motion.model for motion in MOTIONS)}, computed by {ready[0].engine.version}")
         for motion, simulation in zip(MOTIONS, ready, strict=True):
             with tour.step(f"{motion.title}: {motion.model}") as tell, motion_bar("   simulating", motion.to) as bar:
-                trajectory = simulation.run(motion.to, accuracy=1e-5, report_interval=0.01, progress=bar)
+                trajectory = simulation.run(
+                    motion.to, accuracy=ACCURACY, report_interval=REPORT_INTERVAL_S, progress=bar
+                )
                 folder = tour.folder / motion.model
                 trajectory.write(folder)
                 write(simulation.model, folder / f"{simulation.model.name}.osim")
                 tell(motion.told(trajectory), folder)
             result.append(trajectory)
+    _compare_engines(tour, result[0])
     human, states, said = _walk(tour)
     if not pictures:
         return []
@@ -175,6 +184,45 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
         size = sum(page.stat().st_size for page in pages) / 1e6
         tell(f"{size:.1f} MB; they need no network", *pages)
     return pages
+
+
+def _compare_engines(tour: _Tour, compiled: Trajectory) -> None:
+    """Simulate the walker by PyBullet too, if it is installed, and say how far apart the two motions are."""
+    from importlib.util import find_spec
+
+    from osimlite.models.source import make_model
+    from osimlite.simulation.run import Simulation
+
+    motion = MOTIONS[0]
+    with tour.step(f"Simulate the {motion.model} by PyBullet: URDF, with contact forces of OpenSim's laws") as tell:
+        if find_spec("pybullet") is None:
+            tell("PyBullet is not installed; to compare both engines, run: pip install 'osimlite[bullet]'")
+            return
+        with (
+            Simulation(make_model(motion.model), "bullet") as simulation,
+            motion_bar("   simulating", motion.to) as bar,
+        ):
+            bullet = simulation.run(motion.to, accuracy=ACCURACY, report_interval=REPORT_INTERVAL_S, progress=bar)
+        folder = tour.folder / f"{motion.model}-bullet"
+        bullet.write(folder)
+        tell(
+            f"{simulation.engine.version}: in {motion.to:g} s no coordinate is ever farther than "
+            f"{largest_difference(compiled, bullet):.1e} rad or m from the motion of the compiled engine; "
+            f"{_count_steps(compiled)} and {_count_steps(bullet)} steps",
+            folder,
+        )
+
+
+def largest_difference(one: Trajectory, other: Trajectory) -> float:
+    """Return the largest difference of any coordinate (rad or m) between two motions reported at the same times."""
+    import numpy as np
+
+    columns = [other.coordinates.index(name) for name in one.coordinates]
+    return float(np.abs(one.values - other.values[:, columns]).max())
+
+
+def _count_steps(motion: Trajectory) -> int:
+    return int(motion.summary["steps"])
 
 
 def _walk(tour: _Tour) -> tuple[Scenario, Path, str]:

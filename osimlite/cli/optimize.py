@@ -63,7 +63,7 @@ def optimize(
         Option("--measure", metavar="NAME", help="What else to keep in the history.", show_default=False),
     ] = None,
     to: options.To = 2.0,
-    engine: options.Engine = "compiled",
+    engine: options.Engine = None,
     stop_below: sweeping.Below = None,
     stop_above: sweeping.Above = None,
     planted: sweeping.Planted = False,

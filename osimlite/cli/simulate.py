@@ -22,7 +22,7 @@ LIVE_STEP = 1e-3
 def simulate(
     file: options.File,
     to: options.To = 2.0,
-    engine: options.Engine = "auto",
+    engine: options.Engine = None,
     start: options.Start = None,
     start_speed: options.StartSpeed = None,
     controls: options.Controls = None,
@@ -43,8 +43,7 @@ def simulate(
         bool,
         Option(
             "--gui",
-            help="Show it live in PyBullet's window, until you press Escape there (space stops it meanwhile); takes "
-            "fixed steps.",
+            help="Show the motion live in PyBullet's window (--engine bullet, fixed steps); Escape ends it, space pauses.",
         ),
     ] = False,
     **chosen: Any,

@@ -39,7 +39,7 @@ def sweep(
         ),
     ] = None,
     to: options.To = 2.0,
-    engine: options.Engine = "compiled",
+    engine: options.Engine = None,
     stop_below: sweeping.Below = None,
     stop_above: sweeping.Above = None,
     planted: sweeping.Planted = False,

@@ -24,7 +24,7 @@ from osimlite.schema.snapshot import Snapshot
 from osimlite.simulation.constrained import constraints_on, kept_state
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.engines import AUTO, engine_factory
+from osimlite.simulation.engines import engine_factory, engine_name
 from osimlite.simulation.engines.protocol import Engine, Settings
 from osimlite.simulation.integrators import DEFAULT_ACCURACY, LOOSE, MERSON, check_integrator
 from osimlite.simulation.options import PER_RUN, Options
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from osimlite.simulation.files.storage import StoTable
 
 
-def simulate(model: Model, to: float = 2.0, engine: str = "auto", **choices: Any) -> Trajectory:
+def simulate(model: Model, to: float = 2.0, engine: str | None = None, **choices: Any) -> Trajectory:
     """Simulate a model forward in time, from its default pose and speeds.
 
     Constraints, prescribed coordinates and loops are kept up to a tenth of the accuracy. Where the start does not
@@ -52,7 +52,8 @@ def simulate(model: Model, to: float = 2.0, engine: str = "auto", **choices: Any
     Args:
         model: what moves.
         to: how long, s.
-        engine: what computes the accelerations: "bullet", "compiled", or "auto" for the first that is installed.
+        engine: what computes the accelerations: "compiled" (the default) or "bullet"; a window (`show`) needs "bullet",
+            which is the default there.
         choices: attributes of :class:`osimlite.simulation.Options`: `accuracy`, `integrator`, `fixed_step`,
             `report_interval`, `initial`, `initial_speeds`, `skip_unsupported` and the others.
 
@@ -83,14 +84,15 @@ _READY: list[weakref.ref[Tree]] = []
 
 
 @contextmanager
-def _ready(model: Model, engine: str, choices: Mapping[str, Any]) -> Iterator[Simulation]:
+def _ready(model: Model, engine: str | None, choices: Mapping[str, Any]) -> Iterator[Simulation]:
     """A simulation of a model as it is, which stays ready until the model changes.
 
     While it runs nobody else has it, so that threads do not meet in it; whose run fails is not kept.
     """
     expect_model(model)
     tree, chosen = model.tree(), Options.of(choices)
-    key = (engine, *(getattr(chosen, name) for name in TOLD), chosen.route)
+    engine = None if engine is None else engine_name(engine)
+    key = (engine_name(engine), *(getattr(chosen, name) for name in TOLD), chosen.route)
     is_plain = chosen.external_loads is None and not chosen.show
     simulation = tree.kept.pop(key, None) if is_plain else None
     if simulation is None:
@@ -128,7 +130,8 @@ class Simulation:
 
     Args:
         model: what moves.
-        engine: what computes the accelerations: "bullet", "compiled", or "auto" for the first that is installed.
+        engine: what computes the accelerations: "compiled" (the default) or "bullet"; a window (`show`) needs "bullet",
+            which is the default there.
         choices: attributes of :class:`osimlite.simulation.Options`; those of a run hold where a run does not change
             them.
 
@@ -141,10 +144,10 @@ class Simulation:
     """
 
     @any_numbers
-    def __init__(self, model: Model, engine: str = "auto", **choices: Any) -> None:
+    def __init__(self, model: Model, engine: str | None = None, **choices: Any) -> None:
         self.options = chosen = Options.of(choices)
         # Only Bullet has a window.
-        make = engine_factory("bullet" if chosen.show and engine == AUTO else engine)
+        make = engine_factory("bullet" if chosen.show and engine is None else engine)
         self.mechanism: Mechanism = build_mechanism(
             model, opensim_derivatives=chosen.opensim_derivatives, rolling=chosen.rolling
         )

@@ -17,6 +17,7 @@ from osimlite.errors import OsimliteError
 from osimlite.schema.actuators import CoordinateActuator
 from osimlite.simulation import read_sto, write_sto
 from osimlite.simulation.engines import engine_name
+from tests.bare import BareEnvironment
 from tests.cli.command import run
 from tests.simulation.damped import damped
 
@@ -201,35 +202,40 @@ def test_what_a_motion_goes_on_from_is_not_replaced(tmp_path):
     assert run(*again, "-o", "second", folder=tmp_path).code == 0
 
 
-WITHOUT_PYBULLET = "import sys; sys.modules['pybullet'] = None; from osimlite.cli import main; main()"
+@pytest.fixture(scope="module")
+def without_pybullet(tmp_path_factory: pytest.TempPathFactory) -> BareEnvironment:
+    """An environment with the extra `sim` alone, in which PyBullet is not installed."""
+    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
+    return BareEnvironment(tmp_path_factory.mktemp("sim") / "environment", ("sim",))
 
 
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
         ((), 0, "compiled"),
-        (("--engine", "auto", "--fixed-step", "1e-3"), 0, "compiled"),
+        (("--engine", "auto", "--fixed-step", "1e-3"), 0, "engine 'auto' is deprecated"),
         (("--engine", "bullet"), 2, "pip install 'osimlite[bullet]'"),
         (("--gui",), 2, "pip install 'osimlite[bullet]'"),
+        (("--engine", "compiled", "--gui"), 1, "the compiled engine shows no window"),
     ],
 )
-def test_without_pybullet(walker, tmp_path, words, code, said):
-    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT_PYBULLET, "simulate", walker, "--to", "0.1", "-o", "r", *words],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+def test_results_do_not_depend_on_pybullet(without_pybullet, walker, tmp_path, words, code, said):
+    """The compiled engine is the default, whether or not PyBullet is installed; only options select PyBullet."""
+    arguments = "simulate", walker, "--to", "0.1", *words
+    done = without_pybullet.call(*arguments, "-o", "without", folder=tmp_path)
     assert done.returncode == code, done.stderr
     assert said in done.stdout + done.stderr
     if code == 0:
-        assert json.loads((tmp_path / "r" / "summary.json").read_text())["engine"] == "compiled"
+        assert json.loads((tmp_path / "without" / "summary.json").read_text())["engine"] == "compiled"
+        assert run(*arguments, "-o", "here", folder=tmp_path).code == 0
+        states = [(tmp_path / folder / "states.sto").read_bytes() for folder in ("without", "here")]
+        assert states[0] == states[1]
 
 
-def test_auto_is_bullet_where_it_is_installed(monkeypatch):
-    monkeypatch.setattr("osimlite.simulation.engines.find_spec", lambda name: name == "pybullet" or None)
-    assert engine_name("auto") == "bullet"
-    monkeypatch.setattr("osimlite.simulation.engines.find_spec", lambda name: None)
-    assert engine_name("auto") == "compiled"
+def test_auto_is_a_deprecated_name_of_the_default():
+    assert engine_name() == "compiled"
+    with pytest.warns(DeprecationWarning, match="leave it out, or select 'bullet'"):
+        assert engine_name("auto") == "compiled"
 
 
 @pytest.fixture

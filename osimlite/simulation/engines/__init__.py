@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from importlib import import_module
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from osimlite._require import require
-from osimlite.errors import OsimliteError
+from osimlite.errors import DeprecatedWarning, OsimliteError
 from osimlite.text import or_known
 
 if TYPE_CHECKING:
@@ -22,25 +22,36 @@ ENGINES = {
 """Module of each engine, whose `make` makes one."""
 
 
-AUTO = "auto"
-"""Stands for bullet where pybullet is installed, for compiled elsewhere."""
+DEFAULT_ENGINE = "compiled"
+"""What computes a motion if nothing else is selected, whatever packages are installed."""
+
+DEPRECATED_NAME = "auto"
+"""Earlier name of the default: PyBullet where it was installed, so that results depended on that."""
 
 
-def engine_name(name: str) -> str:
-    """The engine of that name, or the one that "auto" stands for here.
+def engine_name(name: str | None = None) -> str:
+    """Return the name of an engine: the default for None and, with a warning, for the deprecated "auto".
 
     Raises:
         OsimliteError: there is no engine of that name.
     """
-    if name == AUTO:
-        return "bullet" if find_spec("pybullet") is not None else "compiled"
+    if name is None:
+        return DEFAULT_ENGINE
+    if name == DEPRECATED_NAME:
+        warnings.warn(
+            f"engine '{DEPRECATED_NAME}' is deprecated: it means '{DEFAULT_ENGINE}', the default; "
+            "leave it out, or select 'bullet'",
+            DeprecatedWarning,
+            stacklevel=3,
+        )
+        return DEFAULT_ENGINE
     if name not in ENGINES:
-        raise OsimliteError(f"there is no engine '{name}'{or_known(name, [*ENGINES, AUTO])}")
+        raise OsimliteError(f"there is no engine '{name}'{or_known(name, [*ENGINES])}")
     return name
 
 
-def engine_factory(name: str) -> EngineFactory:
-    """The function that makes an engine.
+def engine_factory(name: str | None = None) -> EngineFactory:
+    """Return the function that makes an engine, the default one for None.
 
     Raises:
         OsimliteError: there is no engine of that name.
