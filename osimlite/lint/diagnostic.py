@@ -102,13 +102,17 @@ class Finding:
         return visible(f"{self.place}: {self.severity} {self.code} {self.message}{hint}")
 
 
+NOT_MEASURED = ": not measured: "
+"""Stands between the name of a file and the reason in `Report.unmeasured`."""
+
+
 @dataclass(slots=True)
 class Report:
     """Everything found in one or several models, sorted by file and place.
 
     `texts` holds the text of each file with findings, for the snippets of a reporter; `checked` counts the files,
     `known` what a baseline has left out. `unmeasured` has, of each file whose paths and muscles could not be measured,
-    its name and why. `passed` names the files of a folder that are none of OpenSim's.
+    its name, `NOT_MEASURED` and why. `passed` names the files of a folder that are none of OpenSim's.
     """
 
     findings: list[Finding] = field(default_factory=list)
@@ -144,6 +148,18 @@ class Report:
     def codes(self) -> Counter[str]:
         """How often each code was found."""
         return Counter(finding.code for finding in self.findings)
+
+    def missing_package_notes(self) -> list[tuple[str, str]]:
+        """Return the files that were not measured for want of the numeric packages, each with a message.
+
+        Reports for programs contain these notes; other reasons follow from findings, which they contain anyway.
+        """
+        parts = [text.partition(NOT_MEASURED) for text in self.unmeasured]
+        return [
+            (file, f"rules OSIM63 (paths and muscles) not measured: {reason}")
+            for file, _, reason in parts
+            if reason.startswith("needs osimlite[")
+        ]
 
     def at_least(self, severity: Severity) -> list[Finding]:
         """The findings that are as bad as `severity` or worse."""

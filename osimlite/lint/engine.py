@@ -19,7 +19,7 @@ from osimlite.errors import SpecialFileError
 from osimlite.lint import rules
 from osimlite.lint.checked import Checked, Where
 from osimlite.lint.config import Config, Threshold
-from osimlite.lint.diagnostic import Finding, Fix, Report, Severity
+from osimlite.lint.diagnostic import NOT_MEASURED, Finding, Fix, Report, Severity
 from osimlite.lint.faults import Fault, faults_in
 from osimlite.lint.measures import MEASURES
 from osimlite.lint.subject import Subject
@@ -314,7 +314,8 @@ def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Repo
         findings = _not_ignored(subject, comments, findings, left_out)
     unique = list(dict.fromkeys(findings))
     unique.sort(key=lambda finding: (finding.line or 0, finding.column or 0, finding.code))
-    return Report(unique, unmeasured=[f"{subject.file or 'the model'}: {why_not}"] if why_not and measure else [])
+    is_skipped = bool(why_not) and measure
+    return Report(unique, unmeasured=[f"{subject.file or 'the model'}{NOT_MEASURED}{why_not}"] if is_skipped else [])
 
 
 def _is_ignored(finding: Finding, comments: list[Suppression]) -> bool:

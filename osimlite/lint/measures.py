@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 MEASURES = "measures"
 """What rules are about that need them."""
 
+NEEDS_SIM = "needs osimlite[sim]"
+"""Begins the reason why nothing is measured where the numeric packages are not installed."""
+
 FEW = 12
 """Wraps of a model; with more it is worth to compile."""
 
@@ -169,7 +172,8 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
     compiles = sum(1 for _ in subject.named("PathWrap")) > FEW
     missing = absent("numpy", "numba") if compiles else absent("numpy")
     if missing:
-        return f"that needs {listed(missing)}; run: pip install 'osimlite[sim]'"
+        verb = "is" if len(missing) == 1 else "are"
+        return f"{NEEDS_SIM} ({listed(missing)} {verb} not installed); run: pip install 'osimlite[sim]'"
     parts = parts_of(subject)
     known = None if parts is None else recall(parts, subject.kept_in)
     if parts is not None and known is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -10,10 +11,11 @@ import pytest
 
 from osimlite._require import absent
 from osimlite.document.source import Source
-from osimlite.lint import Config, cache, measures, parts, validate
+from osimlite.lint import Config, measures, parts, validate
 from osimlite.lint.many import check_files
-from osimlite.lint.reporters import render
 from osimlite.multibody.parts import CoordinateInfo
+from tests.bare import BareEnvironment
+from tests.cli.command import run
 
 JUMPING = "fail-02-two-coordinates.osim"
 
@@ -26,9 +28,13 @@ def jumping(fixtures: Path, tmp_path: Path) -> Path:
     return path
 
 
-@pytest.fixture
-def without_numpy(monkeypatch):
-    monkeypatch.setattr(measures, "absent", lambda *names: ("numpy",))
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> BareEnvironment:
+    return BareEnvironment(tmp_path_factory.mktemp("bare") / "environment")
+
+
+WHY = "not measured: needs osimlite[sim] (numpy is not installed); run: pip install 'osimlite[sim]'"
+"""What is reported in an environment without numpy."""
 
 
 def test_a_model_without_muscles_is_checked_without_a_numeric_library(fixtures):
@@ -40,29 +46,46 @@ def test_a_model_without_muscles_is_checked_without_a_numeric_library(fixtures):
     assert subprocess.run(command, check=True, capture_output=True, text=True).stdout == "[]\n"
 
 
-def test_what_is_missing_is_told_in_one_line_and_is_no_finding(jumping, without_numpy):
-    report = validate(jumping)
-    assert not report.findings
-    (why,) = report.unmeasured
-    assert why == f"{jumping}: that needs numpy; run: pip install 'osimlite[sim]'"
+def test_missing_packages_are_reported_in_every_format_and_are_no_finding(bare, jumping):
     for name in ("full", "concise"):
-        assert render(report, name, width=200).endswith(f"Paths and muscles (OSIM63) were not measured: {why}.\n")
-    assert not validate(jumping, ignore="OSIM63").unmeasured
+        done = bare.call("validate", "--no-cache", "--format", name, jumping, folder=jumping.parent)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout.endswith(f"Paths and muscles (OSIM63): {jumping}: {WHY}.\n")
+    texts = {}
+    for name in ("json", "sarif", "github"):
+        # A note is no finding, so that --fail-on info does not count it.
+        done = bare.call(
+            "validate", "--no-cache", "--fail-on", "info", "--format", name, jumping, folder=jumping.parent
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        texts[name] = done.stdout
+    (note,) = json.loads(texts["json"])
+    assert (note["code"], note["name"], note["severity"], note["file"]) == (
+        "OSIM63", "not-measured", "info", str(jumping),
+    )  # fmt: skip
+    assert note["message"] == f"rules OSIM63 (paths and muscles) {WHY}"
+    (invocation,) = json.loads(texts["sarif"])["runs"][0]["invocations"]
+    assert WHY in invocation["toolExecutionNotifications"][0]["message"]["text"]
+    assert texts["github"].startswith("::notice title=not-measured::") and WHY in texts["github"]
+    done = bare.call("validate", "--no-cache", "--ignore", "OSIM63", jumping, folder=jumping.parent)
+    assert "measured" not in done.stdout
 
 
-def test_the_cache_tells_it_again_and_measures_once_it_can(jumping, monkeypatch):
-    with monkeypatch.context() as context:
-        for module in (measures, cache):
-            context.setattr(module, "absent", lambda *names: ("numpy",))
-        reports = [check_files([str(jumping)], Config()) for _ in range(2)]
-    assert all(len(report.unmeasured) == 1 and not report.findings for report in reports)
-    assert check_files([str(jumping)], Config()).codes == {"OSIM632": 2}
+def test_the_cache_repeats_the_reason_until_it_can_be_measured(bare, jumping, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "cache"))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    for _ in range(2):
+        assert WHY in bare.call("validate", jumping, folder=jumping.parent).stdout
+    done = run("validate", "--format", "json", jumping, folder=jumping.parent)
+    assert [finding["code"] for finding in json.loads(done.out)] == ["OSIM632"] * 2
 
 
-def test_a_comment_is_not_called_unused_where_nobody_measured(jumping, without_numpy):
+def test_a_comment_is_not_called_unused_where_nobody_measured(bare, jumping):
     jumping.write_text("<!-- osimlite: ignore OSIM632 OSIM505 -->\n" + jumping.read_text().partition("\n")[2])
-    (finding,) = validate(jumping).findings
-    assert finding.code == "OSIM010" and "'OSIM505'" in finding.message
+    done = bare.call("validate", "--no-cache", "--format", "json", jumping, folder=jumping.parent)
+    finding, _ = json.loads(done.stdout)
+    assert finding["code"] == "OSIM010" and "'OSIM505'" in finding["message"]
 
 
 def test_a_model_that_cannot_be_computed_is_named_with_the_reason(fixtures):
@@ -80,7 +103,7 @@ def test_numbers_beyond_what_is_computed_with_are_no_traceback(fixtures):
     )
     report = validate(Source(text.encode()))
     assert [why.partition(" (")[0] for why in report.unmeasured] == [
-        "the model: a number of it is beyond what can be computed with"
+        "the model: not measured: a number of it is beyond what can be computed with"
     ]
 
 

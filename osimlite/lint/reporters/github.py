@@ -9,8 +9,10 @@ _LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: 
 
 
 def render(report: Report) -> str:
-    """One workflow command for each finding."""
-    return "".join(_command(finding) + "\n" for finding in report.findings)
+    """Return one workflow command for each finding, and one if the numeric packages are not installed."""
+    notes = dict.fromkeys(message for _, message in report.missing_package_notes())
+    commands = [*map(_command, report.findings), *(f"::notice title=not-measured::{_data(text)}" for text in notes)]
+    return "".join(f"{command}\n" for command in commands)
 
 
 def _command(finding: Finding) -> str:

@@ -39,11 +39,12 @@ def summary(report: Report, colour: bool = False) -> str:
 
 
 def unmeasured(report: Report) -> str:
-    """That paths and muscles could not be measured, and why; nothing if they were."""
+    """Return the line about paths and muscles that were not measured, and why; nothing if they were."""
     if not report.unmeasured:
         return ""
-    more = f", and {len(report.unmeasured) - 1} more" if len(report.unmeasured) > 1 else ""
-    return visible(f"Paths and muscles (OSIM63) were not measured: {report.unmeasured[0]}{more}.")
+    count = len(report.unmeasured) - 1
+    more = f" (and {count} more {_plural('file', count)})" if count else ""
+    return visible(f"Paths and muscles (OSIM63): {report.unmeasured[0]}{more}.")
 
 
 def passed(report: Report, everything: bool) -> str:
