@@ -43,7 +43,7 @@ def simulate(
         bool,
         Option(
             "--gui",
-            help="Show the motion live in PyBullet's window (--engine bullet, fixed steps); Escape ends it, space pauses.",
+            help="Show the motion live in PyBullet's window, with fixed steps; Escape ends it, space pauses it.",
         ),
     ] = False,
     **chosen: Any,

@@ -58,17 +58,17 @@ def view(
     """
     from osimlite.cli._console import say
     from osimlite.document.reader import read
-    from osimlite.multibody import build_mechanism
+    from osimlite.view.incomplete import build_showable, describe_errors
     from osimlite.view.shown import Shown
 
-    model = read(file)
-    mechanism = build_mechanism(model)
+    model, mechanism, left_out = build_showable(read(file))
     given: Mapping[str, float] = options.quantities(values, mechanism, "--set")
     folders = options.mesh_folders(file, geometry)
     shown = Shown.of(
-        model, mechanism, folders, file=file, motion=motion, forces=forces, values=given, wrapping=wrapping
-    )
-    for remark in shown.remarks:
+        model, mechanism, folders, file=file, motion=motion, forces=forces, values=given, wrapping=wrapping,
+        left_out=left_out,
+    )  # fmt: skip
+    for remark in (*shown.remarks, *describe_errors(shown.findings, shown.scene.remarks)):
         say(remark)
     written = {name: each for name, each in exporters("view").items() if chosen[name] is not None}
     for name, exporter in written.items():

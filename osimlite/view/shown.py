@@ -12,15 +12,14 @@ from osimlite.errors import OsimliteError
 from osimlite.files import write_atomically
 from osimlite.lint import Config, Finding, validate
 from osimlite.meshes.folders import MeshFolders
-from osimlite.multibody import build_mechanism
 from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.records import dataclass, replace
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.gather import OPENSIM
-from osimlite.text import listed
 from osimlite.view.collect import build_scene
 from osimlite.view.glb import write_glb
+from osimlite.view.incomplete import build_showable, describe_left_out
 from osimlite.view.motion import Motion, activity, activity_color, at_times, values_of
 from osimlite.view.page import Story, page_data, page_text
 from osimlite.view.picture import Arrow, Camera, Style, draw
@@ -66,6 +65,7 @@ class Shown:
         forces: Path | None = None,
         values: Mapping[str, float] | None = None,
         wrapping: str = OPENSIM,
+        left_out: Sequence[tuple[str, str]] = (),
     ) -> Shown:
         """Make a model ready.
 
@@ -78,21 +78,22 @@ class Shown:
             forces: a file with contact forces, for a motion from a file.
             values: of coordinates by name (rad, m); over a motion from a file they stay so.
             wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
+            left_out: paths of the parts that were taken out of `model` since they cannot be built, with the reasons.
 
         Raises:
             OsimliteError: a file is missing or not what it should be; no pose fulfils the constraints.
             SettingError: there is no such wrapping.
         """
-        mechanism = build_mechanism(model) if mechanism is None else mechanism
+        if mechanism is None:
+            model, mechanism, left_out = build_showable(model)
         places = MeshFolders(None if file is None else file.parent, folders)
         scene = build_scene(model, mechanism, places, wrapping)
         # What is measured of paths and muscles takes longer than a page to open.
         config = Config(ignore=("OSIM63",), mesh_paths=tuple(str(folder.resolve()) for folder in places.searched))
         findings = validate(model if file is None else file, config=config).findings
-        remarks = []
-        if scene.remarks:
-            paths = listed([path for path, _ in scene.remarks], most=4)
-            remarks.append(f"not drawn: {paths}; the first because: {scene.remarks[0][1]}")
+        if left_out:
+            scene = replace(scene, remarks=[*left_out, *scene.remarks])
+        remarks = [*describe_left_out(scene.remarks)]
         if isinstance(motion, Path):
             folder = None if file is None else file.parent
             motion = read_recording(model, mechanism, motion, forces, values, folder=folder)

@@ -44,9 +44,10 @@ def test_names_are_text():
     assert "<script>alert" not in html and "&lt;script&gt;alert" in html
 
 
-def test_a_model_without_a_mechanism_shows_its_tree_and_says_why(fixtures: Path):
+def test_a_model_with_a_wrong_reference_is_shown_without_that_part(fixtures: Path):
     model = osimlite.read(fixtures / "lint" / "OSIM303" / "fail-01-example.osim")
-    assert "no picture:" in model._repr_html_()
+    html = model._repr_html_()
+    assert "not shown: /markerset/asis: " in html and "no picture:" not in html
 
 
 def test_a_page_too_large_is_left_out(monkeypatch):
@@ -60,8 +61,8 @@ def test_meshes_are_found_beside_the_file(tmp_path: Path):
     source.body_set.objects[0].attach(osimlite.Mesh(name="mesh", mesh_file="cube.obj"))
     osimlite.write(source, tmp_path / "model.osim")
     (tmp_path / "cube.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    assert "not drawn" not in osimlite.read(tmp_path / "model.osim")._repr_html_()
-    assert "not drawn" in source._repr_html_()
+    assert "not shown" not in osimlite.read(tmp_path / "model.osim")._repr_html_()
+    assert "not shown" in source._repr_html_()
 
 
 def test_findings_are_a_table_the_worst_first():

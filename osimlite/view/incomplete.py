@@ -1,0 +1,115 @@
+"""Models with faults: what of them can be shown, and a reason for each part that cannot."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.lint import Finding, Severity
+from osimlite.multibody import Mechanism, build_mechanism
+from osimlite.schema.base import Component
+from osimlite.schema.model import Model
+
+MAX_REMARKS = 12
+"""Number of single parts that are named; of more, the number is given."""
+
+_MISSING_MESH = "the mesh file"
+_QUOTED_PATH = re.compile(r"'(/[^']+)'")
+
+
+class ShowableModel(NamedTuple):
+    """A model whose mechanism can be built, with the paths of parts left out and the reasons."""
+
+    model: Model
+    mechanism: Mechanism
+    left_out: list[tuple[str, str]]
+
+
+def build_showable(model: Model) -> ShowableModel:
+    """Build the mechanism of a model, or of a copy without the joints and constraints that cannot be built.
+
+    A body that loses its joint this way moves freely, as OpenSim's bodies without a joint do; it is shown at ground.
+
+    Raises:
+        ModelError: no single part of the model is to blame.
+        UnsupportedError: likewise.
+    """
+    left_out: list[tuple[str, str]] = []
+    first: ModelError | UnsupportedError | None = None
+    copy = model
+    while True:
+        try:
+            return ShowableModel(copy, build_mechanism(copy), left_out)
+        except (ModelError, UnsupportedError) as error:
+            first = first or error
+            if copy is model:
+                copy = model.copy_deep()
+            path = _take_out(copy, error.message)
+            if path is None:
+                raise first from None
+            left_out.append((path, error.message))
+
+
+def _take_out(model: Model, message: str) -> str | None:
+    """Remove the first member of a set that a message names, and return its path; None if there is none."""
+    tree = model.tree()
+    for path in _QUOTED_PATH.findall(message):
+        # '/jointset/hip/hip_offset' is part of the joint '/jointset/hip', which is of no use without it.
+        member = "/".join(path.split("/")[:3])
+        component = tree.by_path.get(member)
+        if component is not None and member.count("/") == 2 and _remove(model, component):
+            return member
+    return None
+
+
+def _remove(model: Model, component: Component) -> bool:
+    """Remove a component from the list that holds it, whatever else names it; return whether there is such a list."""
+    for holder in model.walk():
+        for spec, item in holder.objects_held():
+            members = getattr(holder, spec.name)
+            if item is component and isinstance(members, list):
+                members.remove(component)
+                return True
+    return False
+
+
+def describe_errors(findings: Iterable[Finding], parts: Sequence[tuple[str, str]]) -> list[str]:
+    """Return a sentence for each error of a model that concerns none of the parts that are not shown.
+
+    Args:
+        findings: of the validator.
+        parts: paths of what is not shown, and why.
+    """
+    known = [path for path, _ in parts]
+    errors = [
+        finding
+        for finding in findings
+        if finding.severity is Severity.ERROR
+        and not any(f"{finding.component}/".startswith(f"{path}/") for path in known)
+    ]
+    lines = []
+    for finding in errors[:MAX_REMARKS]:
+        hint = f"; did you mean '{finding.suggestion}'?" if finding.suggestion else ""
+        lines.append(f"error: {finding.component or 'the document'}: {finding.message}{hint}")
+    more = len(errors) - len(lines)
+    return [*lines, f"{more} more errors; 'osimlite validate' lists them"] if more else lines
+
+
+def describe_left_out(parts: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """Yield sentences about parts that are not shown.
+
+    Args:
+        parts: path of each, and why.
+    """
+    meshes = [path for path, reason in parts if reason.startswith(_MISSING_MESH)]
+    others = [(path, reason) for path, reason in parts if not reason.startswith(_MISSING_MESH)]
+    for path, reason in others[:MAX_REMARKS]:
+        yield f"not shown: {path}: {reason}"
+    if len(others) > MAX_REMARKS:
+        yield f"not shown: {len(others) - MAX_REMARKS} more parts"
+    if meshes:
+        reason = next(reason for _, reason in parts if reason.startswith(_MISSING_MESH))
+        more = f" and {len(meshes) - 1} more" if len(meshes) > 1 else ""
+        yield f"not shown: {meshes[0]}{more}: {reason}"

@@ -1,0 +1,67 @@
+"""Models with one wrong reference are shown, and what is left out is named."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+import osimlite
+from osimlite.errors import ModelError
+from osimlite.view import incomplete
+from osimlite.view.incomplete import MAX_REMARKS, build_showable, describe_left_out
+from tests.cli.command import run
+
+
+@pytest.fixture
+def text(fixtures: Path) -> str:
+    return (fixtures / "walker" / "DynamicWalkerModel.osim").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("/bodyset/RightShank<", "/bodyset/Nowhere<", "not shown: /jointset/RightShankToThigh: "),
+        ("<socket_child_frame>Platform", "<socket_child_frame>x", "not shown: /jointset/PlatformToGround: "),
+        ("<geometry>RFootContact ", "<geometry>RFootContct ", "error: /forceset/RFootForce: "),
+        ("/bodyset/LeftShank</socket_frame>", "/bodyset/Nobody</socket_frame>", "not shown: /contactgeometryset/"),
+    ],
+)
+def test_one_wrong_reference_leaves_the_rest(text: str, tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert old in text
+    (tmp_path / "m.osim").write_text(text.replace(old, new, 1), encoding="utf-8")
+    done = run("view", "m.osim", "--html", "m.html", folder=tmp_path)
+    assert done.code == 0, done.err
+    assert said in done.out and "did you mean" in done.out
+    (data,) = re.findall(r'id="data">(.*?)</script>', (tmp_path / "m.html").read_text(encoding="utf-8"))
+    assert "LeftThigh" in json.dumps(json.loads(data))
+
+
+def test_a_copy_loses_its_part_and_not_the_model(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "m.osim"
+    path.write_text(text.replace("/bodyset/RightShank<", "/bodyset/Nowhere<", 1), encoding="utf-8")
+    model = osimlite.read(path)
+    before = osimlite.to_text(model)
+    shown = build_showable(model)
+    assert [part for part, _ in shown.left_out] == ["/jointset/RightShankToThigh"]
+    assert osimlite.to_text(model) == before and shown.model is not model
+    assert shown.mechanism.coordinate_names
+
+
+def test_a_fault_of_no_single_part_stays_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(model: osimlite.Model) -> None:
+        raise ModelError("the model '/bodyset/nobody' is too heavy")
+
+    monkeypatch.setattr(incomplete, "build_mechanism", refuse)
+    with pytest.raises(ModelError, match="too heavy"):
+        build_showable(osimlite.Model(name="m"))
+
+
+def test_many_parts_are_counted() -> None:
+    parts = [(f"/a/{number}", "it is wrong") for number in range(MAX_REMARKS + 3)]
+    meshes = [("/b/1", "the mesh file x.vtp is missing"), ("/b/2", "the mesh file y.vtp is missing")]
+    lines = [*describe_left_out([*parts, *meshes])]
+    assert len(lines) == MAX_REMARKS + 2 and lines[-2] == "not shown: 3 more parts"
+    assert lines[-1] == "not shown: /b/1 and 1 more: the mesh file x.vtp is missing"
