@@ -94,6 +94,7 @@ def test_motion_forces_and_labels(make, start, to, route, tmp_path):
     trajectory = osimlite.simulate(
         model,
         to,
+        "bullet",
         accuracy=1e-9,
         initial={name: value for name, (value, _) in start.items()},
         initial_speeds={name: speed for name, (_, speed) in start.items()},

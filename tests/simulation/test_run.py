@@ -98,7 +98,7 @@ def test_unknown_coordinate_names_the_nearest(walker):
         ({"to": "2"}, "number of seconds, not '2'"),
         ({"initial": {"swing": float("inf")}}, "give a number"),
         ({"engine": "bulet"}, r"did you mean 'bullet'\?$"),
-        ({"engine": "xyz"}, "there is bullet, compiled and auto$"),
+        ({"engine": "xyz"}, "there is bullet and compiled$"),
         ({"route": "quick"}, "no route"),
     ],
 )

@@ -31,7 +31,10 @@ def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BatchEngin
             "the compiled engine shows no window; osimlite view plays its motions, or take --engine bullet for --gui"
         )
     if settings.route not in ("auto", CompiledEngine.route):
-        raise OsimliteError(f"the compiled engine has no route '{settings.route}'; there is {CompiledEngine.route}")
+        raise OsimliteError(
+            f"the compiled engine has no route '{settings.route}'; there is {CompiledEngine.route}, and others of "
+            "engine 'bullet'"
+        )
     return CompiledEngine(mechanism, forces)
 
 
