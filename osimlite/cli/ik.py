@@ -45,6 +45,7 @@ def ik(
     from osimlite.fitting.inverse_kinematics import inverse_kinematics
     from osimlite.fitting.marker_data import MarkerData
     from osimlite.fitting.orientation_data import holds_orientations
+    from osimlite.fitting.unknown_classes import IGNORED, describe_unknown
     from osimlite.schema.markers import Marker
     from osimlite.simulation.files.old_storage import UNITS, printed
     from osimlite.simulation.files.storage import write_sto
@@ -72,6 +73,8 @@ def ik(
     write_sto(folder / f"{what}_errors.sto", f"{what} errors", motion.times.tolist(), names, errors.tolist())
     for line in told(motion):
         say(line)
+    if words := describe_unknown(model, IGNORED):
+        say(words, err=True)
     if data is not None:
         known = {marker.name: None for marker in model.components(Marker)}
         if missing := [name for name in known if name not in data.names]:

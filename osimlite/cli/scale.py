@@ -77,6 +77,8 @@ def scale(
     if result.placed is not None:
         for line in result.placed.told():
             say(line)
+    if result.unknown:
+        say(result.unknown, err=True)
     path = Path("scaled.osim") if output is None else output
     write(result.model, path)
     say(f"wrote {path}")

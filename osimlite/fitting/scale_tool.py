@@ -16,6 +16,7 @@ from osimlite.fitting.marker_data import Measured as Markers
 from osimlite.fitting.measuring import Measured, Measuring, scale_set
 from osimlite.fitting.placing import Placed, place_markers, pose_text
 from osimlite.fitting.scaling import scale_model
+from osimlite.fitting.unknown_classes import describe_unknown
 from osimlite.records import dataclass, field
 from osimlite.schema.base import Object
 from osimlite.schema.frames import PhysicalFrame
@@ -49,12 +50,18 @@ class Scaled:
         measured: factors of the bodies, and what they come from.
         placed: where the markers went, if they were placed.
         texts: names, from the folder of the setup file, and texts of the files that the tool writes.
+        unknown: what is said of parts of unknown classes, which keep their size; "" if there are none.
     """
 
     model: Model
     measured: Measured | None = None
     placed: Placed | None = None
     texts: dict[str, str] = field(default_factory=dict)
+    unknown: str = ""
+
+
+UNSCALED = "not scaled, but left in the size of the generic model"
+"""What becomes of parts of unknown classes."""
 
 
 def scale(
@@ -116,7 +123,7 @@ def scale(
     measuring.by_hand(by_hand)
     results, mechanism = measuring.found, measuring.mechanism
     scale_model(copy, results.factors, mass, preserve_mass_distribution=preserve_mass_distribution, mechanism=mechanism)
-    result = Scaled(copy, measuring.found)
+    result = Scaled(copy, measuring.found, unknown=describe_unknown(model, UNSCALED))
     if place and data is not None:
         result.placed = place_markers(copy, data, tasks, start, end)
     return result
@@ -155,6 +162,8 @@ def run_scale(tool: ScaleTool, folder: Path) -> Scaled:
         raise SettingError("the setup names no model; put its file into model_file of GenericModelMaker")
     result = Scaled(read_anew(folder / maker.model_file, Model))
     model = result.model
+    if scaler.apply:
+        result.unknown = describe_unknown(model, UNSCALED)
     if maker.marker_set_file not in UNNAMED:
         add_markers(model, folder / maker.marker_set_file)
     model.name = tool.name

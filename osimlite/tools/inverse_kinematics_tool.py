@@ -6,6 +6,7 @@ import numpy as np
 
 from osimlite.fitting.ik_tool import motion_table, run_inverse_kinematics, told
 from osimlite.fitting.marker_data import MarkerData
+from osimlite.fitting.unknown_classes import IGNORED, describe_unknown
 from osimlite.schema.tools.inverse_kinematics import IKMarkerTask, InverseKinematicsTool
 from osimlite.simulation.files.old_storage import UNITS
 from osimlite.simulation.files.storage import StoTable, read_sto
@@ -27,7 +28,8 @@ def run(job: Job, outcome: Outcome) -> None:
     if setup.output_motion_file.strip() not in NONE:
         outcome.table(job.result(setup.output_motion_file), motion_table(motion), f"\n{UNITS}")
     if setup.report_errors:
-        squares = motion.marker_errors**2
+        # Of the markers that are seen; like OpenSim, the mean is over all markers, seen or not.
+        squares = np.nan_to_num(motion.marker_errors**2)
         totals = squares.sum(axis=1)
         rows = np.column_stack([totals, np.sqrt(totals / squares.shape[1]), np.sqrt(squares.max(axis=1))])
         labels = ("total_squared_error", "marker_error_RMS", "marker_error_max")
@@ -42,6 +44,8 @@ def run(job: Job, outcome: Outcome) -> None:
         model, job.needed("model_file"), motion.mechanism, times, motion.values,
         markers=motion.markers, measured=motion.measured, places=motion.places,
     )  # fmt: skip
+    if words := describe_unknown(model, IGNORED):
+        outcome.warn("unknown classes", words)
     outcome.summary |= motion.summary
     for words in told(motion):
         outcome.tell("markers", words)

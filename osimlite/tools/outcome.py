@@ -11,6 +11,7 @@ import numpy as np
 
 from osimlite.errors import DocumentError, SettingError, SimulationError
 from osimlite.lint.diagnostic import Finding
+from osimlite.quantity import tell
 from osimlite.records import dataclass, field, replace
 from osimlite.simulation.files.old_storage import PRECISION, printed
 from osimlite.simulation.files.storage import StoTable, adapter_lines
@@ -73,6 +74,11 @@ class Outcome:
     def tell(self, name: str, words: str) -> None:
         """Say something of what came out."""
         self.told.append((name, words))
+
+    def warn(self, name: str, words: str) -> None:
+        """Say something of what came out that makes it doubtful, also on standard error."""
+        self.tell(name, words)
+        tell(words)
 
     def _require_numbers(self) -> None:
         """Refuse motions that are no numbers, and infinite numbers. Unseen markers and some muscles have none."""

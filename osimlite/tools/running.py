@@ -33,6 +33,8 @@ IGNORED = ("OSIM101",)
 Moco, which is searched for long, has none of these."""
 
 STUDY = ".omoco"
+NO_OPTION = " there, or take it out of the model"
+"""What is said in place of advice on an option that `run` does not have."""
 
 
 class FaultySetup(DocumentError):
@@ -114,6 +116,9 @@ def run(
         tool.run(Job(top, file, None if output is None else Path(output), refine, simulates), outcome)
         outcome.write(file, writer)
     except OsimliteError as error:
+        from osimlite.simulation.elements.gather import SKIP_ADVICE
+
+        error.message = error.message.replace(SKIP_ADVICE, NO_OPTION)
         error.file = error.file or str(file)
         subject = subject_of(str(file), Config()) if isinstance(error, MissingFileError) else None
         if isinstance(subject, Setup) and (maker := subject.writer_of(error.file)) is not None:

@@ -12,6 +12,8 @@ def run(job: Job, outcome: Outcome) -> None:
     result = run_scale(job.setup, job.file.parent)
     for name, text in result.texts.items():
         outcome.text(job.result(name), text)
+    if result.unknown:
+        outcome.warn("unknown classes", result.unknown)
     if result.measured is not None:
         outcome.summary["ratios"] = dict(result.measured.ratios)
         for name, ratio in result.measured.ratios.items():

@@ -34,6 +34,8 @@ LEAST_SHARE = 1e-6
 """The forces count by no less, so that one answer is the best."""
 WEAK = 1e-9
 """Part of its greatest force that a muscle can give at least, if it is to be asked for any."""
+AGREEMENT = 1e-6
+"""How far (rad or m) a desired motion may be from a lock before this is worth a message."""
 RANK = 1e-10
 """Of the largest eigenvalue: what is below is none."""
 
@@ -77,9 +79,14 @@ class Desired:
         times, values = continued(recorded.times, PADDING), continued(recorded.values, PADDING)
         if setup.lowpass_cutoff_frequency >= 0.0:
             times, values = lowpassed_by_sinc(times, values, setup.lowpass_cutoff_frequency, ORDER)
+        _follow_locks(outcome, mechanism, recorded, values)
         padded = replace(recorded, times=times, values=values)
         # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints change the values.
         values, speeds = constrained(padded, padded.rates[0], simulation, model)
+        # OpenSim assembles every row of the desired motion at the time 0: its functions say one value for all rows.
+        for place, info in enumerate(mechanism.coordinates):
+            if info.prescribed is not None:
+                values[:, place] = info.prescribed.evaluate((0.0,))[0]
         (accelerations,) = derivatives_of_samples(times, speeds, times, (1,))
         return cls(start, end, times, values, speeds, accelerations)
 
@@ -101,6 +108,29 @@ class Desired:
         q, rates = self._curves[0].derivatives(moments, (0, 1))
         (others,) = self._curves[1].derivatives(moments, (0,))
         return np.stack([q, rates, *np.split(others, 2, axis=1)], axis=1)
+
+
+def _follow_locks(outcome: Outcome, mechanism: Mechanism, recorded: RecordedMotion, values: Array) -> None:
+    """Let locks win over a desired motion, as in OpenSim; say where they differ.
+
+    Args:
+        outcome: that says so.
+        mechanism: whose coordinates move.
+        recorded: the motion of the file.
+        values: of the padded rows (t, n), changed in place.
+    """
+    for place, info in enumerate(mechanism.coordinates):
+        if not info.locked:
+            continue
+        values[:, place] = info.default_value
+        apart = float(np.abs(info.default_value - recorded.values[:, place]).max())
+        if info.name not in recorded.missing and apart > AGREEMENT:
+            unit = "rad" if info.motion_type == "rotational" else "m"
+            outcome.tell(
+                info.name,
+                f"locked at {info.default_value:g} {unit}; the desired motion is up to {apart:.3g} {unit} away from "
+                "that: as in OpenSim, the lock wins, and a task of this coordinate has nothing to do",
+            )
 
 
 class Task(NamedTuple):
@@ -254,7 +284,9 @@ class Sharing:
         # The forces of muscles whose fibers can give none count without end: they are as small as they can be.
         able = np.abs(strengths) > WEAK * np.abs(self.optimal)
         forces = np.clip(0.0, *bounds)
-        counted = self.tasks.weights != 0.0
+        # A locked coordinate has no acceleration that forces could change.
+        infos = [self.mechanism.coordinates[k] for k in self.tasks.coordinates]
+        counted = (self.tasks.weights != 0.0) & ~np.array([info.locked for info in infos])
         each, left = columns[counted][:, able], (rest - columns[:, ~able] @ forces[~able])[counted]
         scale = strengths[able]
         scaled = np.sort(np.array(bounds)[:, able] / scale, axis=0)
@@ -267,7 +299,11 @@ class Sharing:
         lacking = left - each @ forces[able]
         if solved[0] and (np.abs(lacking) <= CLOSE * (np.abs(each) @ np.abs(forces[able]))).all():
             return forces, ""
-        names = [task.name for task, counts in zip(self.tasks.tasks, counted, strict=True) if counts]
+        names = [
+            task.name if info.prescribed is None else f"{task.name} (which is prescribed)"
+            for task, info, counts in zip(self.tasks.tasks, infos, counted, strict=True)
+            if counts
+        ]
         off = np.abs(lacking)
         worst = [f"{lacking[k]:.4g} at {names[k]}" for k in np.argsort(-off) if off[k] > 0.1 * off.max()]
         return forces, listed(worst, most=3)

@@ -132,3 +132,33 @@ def test_a_motion_off_the_constraints_is_tracked(tmp_path: Path, setup: str) -> 
     (folder / "walk.mot").unlink()
     write_sto(folder / "walk.mot", "m", table.times.tolist(), table.columns, rows.tolist(), in_degrees=True)
     compare_runs(folder, setup)
+
+
+LOCK = "<locked>true</locked>"
+HELD = {
+    "lock off the motion": [],
+    "another lock": [
+        (f'<Coordinate name="pelvis_tx">{LOCK}', '<Coordinate name="pelvis_tx">'),
+        (
+            '<Coordinate name="knee_angle"><default_value>0<',
+            f'<Coordinate name="knee_angle">{LOCK}<default_value>-0.5<',
+        ),
+    ],
+    "two locks": [('<Coordinate name="pelvis_tilt">', f'<Coordinate name="pelvis_tilt">{LOCK}')],
+    "prescribed": [
+        (
+            f'<Coordinate name="pelvis_tx">{LOCK}',
+            '<Coordinate name="pelvis_tx"><prescribed_function><LinearFunction name="f"><coefficients>0.3 0.2'
+            "</coefficients></LinearFunction></prescribed_function><prescribed>true</prescribed>",
+        )
+    ],
+}
+
+
+@pytest.mark.parametrize("held", [*HELD])
+def test_tasks_of_coordinates_that_are_held(tmp_path: Path, held: str) -> None:
+    """Locks win over the file, and so does the function of a prescribed coordinate, at the time 0."""
+    folder = copy_lab("locked", tmp_path)
+    change(folder / "leg.osim", *HELD[held])
+    change(folder / "rra.xml", ("<final_time>0.3<", "<final_time>0.22<"))
+    compare_runs(folder, "rra.xml")

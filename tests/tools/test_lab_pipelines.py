@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("scipy", reason="needs scipy (extra 'sim')")
 
 import osimlite
-from osimlite.quantity import DoubtfulWarning
+from osimlite.errors import DoubtfulWarning
 from osimlite.simulation.files.storage import read_sto
 from tests.cli.command import run
 from tests.labs import change, copy_lab
@@ -98,3 +98,59 @@ def test_energy_of_limits_has_one_label(tmp_path: Path, name: str) -> None:
     assert not any("." in label for label in forces.columns)
     assert forces.columns[: len(reporter.columns)] == reporter.columns
     assert read_sto(folder / "out" / "so_StaticOptimization_force.sto").columns == forces.columns
+
+
+@pytest.mark.parametrize("setup", ["cmc.xml", "cmc_slow.xml"])
+def test_a_lock_is_named(tmp_path: Path, setup: str) -> None:
+    """A task of a locked coordinate ends no motion, and what is said names the lock."""
+    folder = copy_lab("locked", tmp_path)
+    result = osimlite.run(folder / setup, folder / "out")
+    assert result.done
+    said = dict(result.told)["pelvis_tx"]
+    assert "locked at 0 m" in said
+    (errors,) = (table for name, table in result.tables.items() if name.endswith("_pErr.sto"))
+    assert (errors["pelvis_tx"] == 0.0).all()
+
+
+PART = '<LabContactForce name="cartilage">'
+UNKNOWN = {
+    "a force": [],
+    "two forces": [(PART, '<Other_Plugin name="more"><size>1</size></Other_Plugin>' + PART)],
+    "a wrap object": [
+        (
+            '<Body name="thigh">',
+            '<Body name="thigh"><WrapObjectSet name="w"><objects><LabWrap name="patella"><size>1</size></LabWrap>'
+            "</objects></WrapObjectSet>",
+        )
+    ],
+}
+
+
+@pytest.mark.parametrize("part", [*UNKNOWN])
+@pytest.mark.parametrize("setup", ["scale.xml", "ik.xml"])
+def test_parts_of_unknown_classes_are_named(tmp_path: Path, part: str, setup: str) -> None:
+    folder = copy_lab("plugin", tmp_path)
+    change(folder / "leg.osim", *UNKNOWN[part])
+    done = run("run", setup, "-o", "out", folder=folder)
+    assert done.code == 0
+    words = " ".join(done.err.split())
+    for name in ("LabContactForce", "LabWrap", "Other_Plugin"):
+        assert (name in words) == (name in (folder / "leg.osim").read_text())
+    assert ("left in the size of the generic model" in words) == (setup == "scale.xml")
+
+
+@pytest.mark.parametrize("setup", ["id.xml", "so.xml"])
+def test_advice_names_no_option_that_run_lacks(tmp_path: Path, setup: str) -> None:
+    done = run("run", setup, folder=copy_lab("plugin", tmp_path))
+    assert done.code in (1, 2)
+    assert "LabContactForce" in done.err
+    assert "skip" not in done.err
+
+
+def test_commands_without_setups_name_unknown_classes(tmp_path: Path) -> None:
+    folder = copy_lab("plugin", tmp_path)
+    scaled = run("scale", "leg.osim", "--factor", "thigh=1.1", "-o", "scaled.osim", folder=folder)
+    fitted = run("ik", "leg.osim", "static.trc", "-o", "ik", folder=folder)
+    for done in (scaled, fitted):
+        assert done.code == 0, done.err
+        assert "LabContactForce" in done.err

@@ -94,8 +94,7 @@ def force_elements(
             skipped.append(error.message)
     if skipped and not skip_unsupported:
         raise UnsupportedError(
-            f"osimlite cannot compute {listed(by_class(skipped))}; set appliesForce to false, "
-            "or leave out what cannot be computed with --skip-unsupported (skip_unsupported=True)"
+            f"osimlite cannot compute {listed(by_class(skipped))}; set appliesForce to false{SKIP_ADVICE}"
         )
     if external_loads is not None:
         from osimlite.simulation.elements.external_loads import read_external_loads
@@ -108,6 +107,8 @@ def force_elements(
     return Forces(tuple(elements), tuple(skipped), controls, reads_files)
 
 
+SKIP_ADVICE = ", or leave out what cannot be computed with --skip-unsupported (skip_unsupported=True)"
+"""Advice for those commands that have this option; those that run setups have not, and take it out of the message."""
 FEW = 4
 """So many forces that are left out are told of one by one."""
 
