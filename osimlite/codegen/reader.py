@@ -11,6 +11,7 @@ import builtins
 import linecache
 from collections.abc import Callable
 from functools import cached_property
+from types import ModuleType
 from typing import Any
 
 from osimlite.errors import UnsupportedError
@@ -58,10 +59,10 @@ class Kernel:
         return name_of(self.function)
 
     def value(self, node: ast.expr) -> Any:
-        """What a name means in the module of the function, or a field of a record there; None if nothing."""
+        """Return what a global name, or an attribute of a record or module, stands for; None if nothing."""
         if isinstance(node, ast.Attribute):
-            record = self.value(node.value)
-            return getattr(record, node.attr) if isinstance(record, Record) else None
+            owner = self.value(node.value) if isinstance(node.value, ast.Name | ast.Attribute) else None
+            return getattr(owner, node.attr, None) if isinstance(owner, Record | ModuleType) else None
         name = node.id if isinstance(node, ast.Name) else ""
         scope = self.function.__globals__
         return scope[name] if name in scope else getattr(builtins, name, None)

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from math import sqrt
 
 import numpy as np
 import pytest
 
 from osimlite.codegen.javascript import as_javascript
+from osimlite.codegen.reader import TranslationError
 from osimlite.kernels.paths import pull_path
 from osimlite.kernels.pointers import at
 from osimlite.kernels.table import LAW_MODULES
 from osimlite.simulation.elements.kind import Kind, kinds
 from osimlite.simulation.elements.laws import law_function
+from tests.codegen import constructs
+from tests.codegen.compiled import are_same_bits, call_python
 
 TABLE = 3, 4
 
@@ -85,34 +87,72 @@ def test_functions_give_the_same(page):
     assert result == [pointers(np.arange(6.0), k) for k in (1, 2, 4)]
 
 
-def test_what_is_not_known_is_an_error():
-    def held(a: float) -> float:
-        with open("x"):
-            return a
-
-    def called(a: float) -> float:
-        return math.sqrt(a)
-
-    for function in (held, called):
-        with pytest.raises(NotImplementedError, match=function.__name__):
-            as_javascript([], [function])
+def opens(a: float) -> float:
+    """A statement that no kernel has."""
+    with open("x"):
+        return a
 
 
-def test_all_kernels_are_translated_but_those_with_named_tuples():
-    """Pages compute paths; muscles and the engine's own loops are told apart by the tuples that they are given."""
-    named = re.compile(r": (MuscleInputs|Motion|Fit|Assembly|Walk)\(|: [am]\.")
-    translated = set()
-    for name in [*LAW_MODULES, *(kind.name for kind in kinds() if isinstance(kind, Kind))]:
+def asks(a: float) -> float:
+    """A function of Python's library that neither JavaScript nor the runtime has."""
+    return math.lgamma(a)
+
+
+def masks(a: int) -> int:
+    """Bits that JavaScript takes for a sign."""
+    return a & 0xFFFFFFFF
+
+
+def shares(a: int) -> int:
+    """A function that is called with a keyword."""
+    return max(a, 1, key=abs)
+
+
+@pytest.mark.parametrize("function", (opens, asks, masks, shares), ids=lambda function: function.__name__)
+def test_what_is_not_known_is_an_error(function):
+    with pytest.raises(TranslationError, match=f"'test_javascript_{function.__name__}'.* JavaScript") as caught:
+        as_javascript([], [function])
+    assert caught.value.file == __file__
+
+
+def test_all_kernels_are_translated_but_those_with_random_numbers():
+    """Noise of reflexes is of integers of 64 bits."""
+    kernels = [*LAW_MODULES, *(kind.name for kind in kinds() if isinstance(kind, Kind))]
+    translated = []
+    for name in kernels:
         try:
-            as_javascript([law_function(name)], [pull_path])
-            translated.add(name)
-        except NotImplementedError as error:
-            assert named.search(str(error)), name
-    assert {
-        "wrapped_path",
-        "geodesic_path",
-        "cable_path",
-        "pull_points",
-        "evaluate",
-        "path_spring",
-    } <= translated
+            translated.append((name, as_javascript([law_function(name)], [pull_path])))
+        except TranslationError as error:
+            assert "the function 'reflexes_" in str(error) and "64 bits" in str(error), name
+    assert {*kernels} - {name for name, _ in translated} == {"run_by_reflexes", "walk_several"}
+
+
+@pytest.fixture(scope="module")
+def results():
+    """By name, the results of the functions of the module `constructs` for all inputs."""
+    from tests.codegen.node import NODE, call_javascript
+
+    if NODE is None:
+        pytest.skip("needs Node.js on the PATH")
+    tested = [*constructs.EXACT, constructs.compute_series]
+    calls = [(function.__name__, *given) for function in tested for given in constructs.INPUTS]
+    found = iter(call_javascript(as_javascript([], tested), calls))
+    return {function.__name__: [next(found) for _ in constructs.INPUTS] for function in tested}
+
+
+def without_signs_of_zero(result):
+    """Return a result in which zeros are positive: in JavaScript, integers have negative zeros too."""
+    return [x + 0 if not isinstance(x, list) else without_signs_of_zero(x) for x in result]
+
+
+@pytest.mark.parametrize("function", constructs.EXACT, ids=lambda function: function.__name__)
+def test_each_construct(results, function):
+    for given, result in zip(constructs.INPUTS, results[function.__name__], strict=True):
+        expected = call_python(function, *given)
+        assert are_same_bits(without_signs_of_zero(result), without_signs_of_zero(expected)), given
+
+
+def test_functions_of_mathematics(results):
+    for given, result in zip(constructs.INPUTS, results["compute_series"], strict=True):
+        expected = call_python(constructs.compute_series, *given)
+        assert result[3] == pytest.approx(expected[3], rel=5e-15, abs=0.0), given

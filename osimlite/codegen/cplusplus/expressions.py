@@ -33,7 +33,6 @@ OPERATORS: dict[type[ast.operator], tuple[str, int]] = {
     ast.Div: ("/", PRODUCT),
     ast.Add: ("+", SUM),
     ast.Sub: ("-", SUM),
-    ast.LShift: ("<<", SHIFT),
     ast.RShift: (">>", SHIFT),
     ast.BitAnd: ("&", BIT_AND),
     ast.BitXor: ("^", BIT_XOR),
@@ -43,6 +42,7 @@ FUNCTIONS: dict[type[ast.operator], str] = {
     ast.FloorDiv: "floor_divide",
     ast.Mod: "modulo",
     ast.Pow: "power",
+    ast.LShift: "shift_left",
 }
 """Operators that mean something else in C++, or nothing, by the function of the header."""
 COMPARISONS: dict[type[ast.cmpop], tuple[str, int]] = {
@@ -366,9 +366,16 @@ class ExpressionWriter:
         if type(op) not in OPERATORS:
             raise self.function.refuse(node)
         sign, precedence = OPERATORS[type(op)]
+        if isinstance(op, ast.Mult) and are_integers and self._may_overflow(node):
+            return Code(f"py::multiply({one}, {two})")
         if isinstance(op, ast.Div) and are_integers:
             one = f"static_cast<double>({one})"
         return Code(f"{one} {sign} {two}", precedence)
+
+    def _may_overflow(self, node: ast.AST) -> bool:
+        """Return whether a product has a factor that only generators of random numbers have."""
+        factors = [node.left, node.right] if isinstance(node, ast.BinOp) else [right_of(node)]
+        return any(abs(self.function.constant_index(part) or 0) >= 2**31 for part in factors if part is not None)
 
     def either(self, node: ast.BoolOp) -> Code:
         """Return the text of `and` or `or`; of numbers it is the one that decides."""
@@ -393,14 +400,15 @@ class ExpressionWriter:
         if any(isinstance(op, ast.In | ast.NotIn) for op in node.ops):
             return self._contains(node)
         operands = [node.left, *node.comparators]
-        if any(self.function.effects_of(operand) & WRITES for operand in operands[2:]):
-            raise self.function.refuse(node, "an operand that writes memory may be left out")
+        if any(self.function.effects_of(operand) & WRITES for operand in operands[2:-1]):
+            raise self.function.refuse(node, "an operand that writes memory is compared twice")
         texts = self.ordered(operands[:2], self._comparand)
         for operand in operands[2:]:
-            if not is_simple(operands[len(texts) - 1]):
+            before = operands[len(texts) - 1]
+            if not is_simple(before):
                 # It is compared twice and evaluated once.
-                texts[-1] = self.hold(self.function.known_type(operands[len(texts) - 1]), texts[-1])
-            texts.append(self._comparand(operand))
+                texts[-1] = self.hold(self.function.known_type(before), texts[-1])
+            texts.append(self.guarded(self._comparand, operand))
         signs = [COMPARISONS[type(op)][0] for op in node.ops]
         parts = [f"{a} {sign} {b}" for a, sign, b in zip(texts[:-1], signs, texts[1:], strict=True)]
         return Code(" && ".join(parts), COMPARISONS[type(node.ops[0])][1] if len(parts) == 1 else AND)

@@ -65,6 +65,12 @@ inline double floor_divide(double a, double b) {
     return quotient - whole > 0.5 ? whole + 1.0 : whole;
 }
 
+// Products and shifts of integers that keep the lower 64 bits.
+inline int64_t multiply(int64_t a, int64_t b) {
+    return static_cast<int64_t>(static_cast<uint64_t>(a) * static_cast<uint64_t>(b));
+}
+inline int64_t shift_left(int64_t a, int64_t b) { return static_cast<int64_t>(static_cast<uint64_t>(a) << b); }
+
 // An integer power of a float is a product, as it is in compiled Python.
 inline double power(double base, int64_t exponent) {
     uint64_t rest = exponent < 0 ? 0 - static_cast<uint64_t>(exponent) : static_cast<uint64_t>(exponent);

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
+from inspect import Parameter, signature
 from types import FunctionType
 from typing import Any
 
@@ -14,6 +14,7 @@ from osimlite.codegen.cplusplus.expressions import escape_name, write_number
 from osimlite.codegen.cplusplus.inference import Specialisation
 from osimlite.codegen.cplusplus.statements import FunctionWriter
 from osimlite.codegen.cplusplus.types import (
+    BOOLEAN,
     FLOAT,
     INTEGER,
     Dual,
@@ -73,9 +74,9 @@ class Library:
             TranslationError: the function, or one that it calls, uses something that has no counterpart in C++.
         """
         number = dual(directions) if directions else FLOAT
-        kinds = [self._parameter(function, item, number) for item in inspect.signature(function).parameters.values()]
         try:
             assert isinstance(function, FunctionType)
+            kinds = [self._parameter(function, item, number) for item in signature(function).parameters.values()]
             specialisation = self.specialise(function, kinds)
             self._writing.append(symbol)
             self.called[symbol] = set()
@@ -90,12 +91,13 @@ class Library:
             for given, kind in zip(specialisation.given, kinds, strict=True)
         )
         call = f"{name}({', '.join(map(escape_name, specialisation.given))})"
-        self.exports[symbol] = (
-            f"OSIMLITE_EXPORT {self.name_type(specialisation.result)} {symbol}({parameters}) {{\n    return {call};\n}}"
-        )
+        # Who calls a kernel reads an integer, of which a truth value would fill one byte only.
+        result = INTEGER if specialisation.result is BOOLEAN else specialisation.result
+        head = f"OSIMLITE_EXPORT {self.name_type(result)} {symbol}({parameters})"
+        self.exports[symbol] = f"{head} {{\n    return {call};\n}}"
 
     @staticmethod
-    def _parameter(function: Callable[..., Any], parameter: inspect.Parameter, number: Type) -> Type:
+    def _parameter(function: Callable[..., Any], parameter: Parameter, number: Type) -> Type:
         annotation = str(getattr(parameter.annotation, "__name__", parameter.annotation)).strip("'\"")
         if annotation not in PARAMETERS:
             kernel = Kernel(function, "C++")

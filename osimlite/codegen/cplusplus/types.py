@@ -165,7 +165,7 @@ def type_of_constant(value: Any) -> Type | None:
     if isinstance(value, bool):
         return BOOLEAN
     if isinstance(value, int):
-        return INTEGER
+        return INTEGER if -(2**63) < value < 2**63 else None
     if isinstance(value, float):
         return FLOAT
     if isinstance(value, FunctionType):
