@@ -1,15 +1,20 @@
 """Which functions a kernel consists of, and a digest of their code.
 
 A kernel consists of its own function and of all functions of this package that it calls. Two states of the sources
-that compile to the same code have the same digest: comments, docstrings and line numbers do not count.
+that compile to the same code have the same digest: comments, docstrings and line numbers do not count. Every version of
+Python computes the same digest, because one compiled library serves them all.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
+import inspect
 from collections.abc import Iterator
 from functools import cache
-from types import CodeType, FunctionType
+from operator import itemgetter
+from textwrap import dedent
+from types import FunctionType
 from typing import Any
 
 from osimlite.kernels.layout import Record
@@ -46,23 +51,25 @@ def _describe_function(function: FunctionType) -> tuple[Any, ...]:
     """Return everything of one function that decides what it is compiled to."""
     values = [
         (name, value.__qualname__ if _is_local(value) else _describe_value(value))
-        for name, value in _global_values(function)
+        for name, value in sorted(_global_values(function), key=itemgetter(0))
     ]
-    return function.__qualname__, function.__annotations__, function.__defaults__, _describe_code(function), values
+    return function.__qualname__, _normalize_source(function), values
 
 
-def _describe_code(function: FunctionType) -> tuple[Any, ...]:
-    code = function.__code__
-    constants = [item.co_code if isinstance(item, CodeType) else item for item in code.co_consts]
-    if function.__doc__ is not None and constants[0] == function.__doc__:
-        constants[0] = None
-    return code.co_code, constants, code.co_names, code.co_varnames
+@cache
+def _normalize_source(function: FunctionType) -> str:
+    """Return the text of a function without comments and docstring, in one layout."""
+    (tree,) = ast.parse(dedent(inspect.getsource(function))).body
+    assert isinstance(tree, ast.FunctionDef)
+    if ast.get_docstring(tree, clean=False) is not None:
+        del tree.body[0]
+    return ast.unparse(tree)
 
 
 def _global_values(function: FunctionType) -> list[tuple[str, Any]]:
     """Return the global names that a function uses, with their values."""
     scope = function.__globals__
-    return [(name, scope[name]) for name in function.__code__.co_names if name in scope]
+    return [(name, scope[name]) for name in dict.fromkeys(function.__code__.co_names) if name in scope]
 
 
 def _is_local(value: object) -> bool:
@@ -75,7 +82,7 @@ def _describe_value(value: Any) -> Any:
     if isinstance(value, Record):
         return value.__qualname__, {name: number for name, number in vars(value).items() if name.isupper()}
     if isinstance(value, type):
-        return value.__qualname__, getattr(value, "_fields", ()), getattr(value, "__annotations__", {})
+        return value.__qualname__, getattr(value, "_fields", ()), getattr(value, "_field_defaults", {})
     if isinstance(value, int | float | str | tuple):
         return value
     return getattr(value, "__qualname__", type(value).__name__)

@@ -118,6 +118,17 @@ class Kind:
         """Of its kernel, and of the module that declares it."""
         return module_name(self.component.__name__)
 
+    @property
+    def forms(self) -> list[str]:
+        """Return the endings of the names of its kernels, "" first."""
+        optional = {
+            EQUILIBRIUM: self.equilibrium is not None,
+            RESPONSE: self.text.responds,
+            RIGID: self.rigid is not None,
+            ABREAST: self.abreast is not None,
+        }
+        return ["", OFF, *(form for form, is_there in optional.items() if is_there)]
+
     def make(self, builder: ElementBuilder, force: Any) -> DeclaredForce:
         """The element of a component.
 

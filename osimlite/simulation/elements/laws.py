@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any
 
 from osimlite.kernels.table import LAW_MODULES, own_function
@@ -21,6 +22,54 @@ FORMS = {
 }  # fmt: skip
 ALONG = "~"
 """Between the name of a function and how many directions its numbers carry derivatives along."""
+
+DIRECTIONS = 16
+"""Number of directions of the derivatives that the library of kernels is compiled for."""
+
+WITHOUT_DERIVATIVES = frozenset(
+    (
+        # Whole motions, which are followed step by step, and methods that no derivatives are followed along.
+        "run_several", "hold_several", "walk_several", "run_by_reflexes", "euler2", "adams", "bdf", "rosenbrock",
+        # Searches, and looks at many poses.
+        "fit_frames", "least_effort", "watch", "look", "push_each", "assemble_poses",
+        # What finds a start, which is held.
+        "equilibrate", "project",
+        # What methods for stiff motions ask, and pictures.
+        "contact_response", "smooth_contact_response", "contact_places",
+        *(name for name in LAW_MODULES if name.startswith("trace_")),
+    )
+)  # fmt: skip
+"""Laws of the engine that nobody needs derivatives from: the library has them for floats only."""
+
+
+def library_laws(directions: int = 0) -> list[str]:
+    """Return the names of all laws of this package, in a fixed order, as the library of kernels has them.
+
+    Args:
+        directions: of the derivatives that their numbers carry; 0 for floats.
+    """
+    kinds, probes = (import_module(f"{__package__}.{name}") for name in ("kinds", "probes"))
+    names = list(LAW_MODULES)
+    for name in sorted(module.name for module in iter_modules(kinds.__path__)):
+        kind: Any = getattr(import_module(f"{kinds.__name__}.{name}"), "KIND", None)
+        if hasattr(kind, "forms"):
+            names += [name + form for form in kind.forms]
+    for name in sorted(module.name for module in iter_modules(probes.__path__)):
+        probe = getattr(import_module(f"{probes.__name__}.{name}"), "PROBE", None)
+        if getattr(probe, "law", None) is not None:
+            names.append(name)
+    if not directions:
+        return names
+    # The kernels of responses have derivatives of their own within; nothing is brought into equilibrium on the way.
+    without = EQUILIBRIUM, RESPONSE, ABREAST
+    return [
+        f"{name}{ALONG}{directions}" for name in names if name not in WITHOUT_DERIVATIVES and not name.endswith(without)
+    ]
+
+
+def symbol_of(name: str) -> str:
+    """Return the symbol of a law in compiled libraries."""
+    return name.replace(ALONG, "_along_")
 
 
 def law_of(name: str) -> tuple[Callable[..., Any], int]:

@@ -1,0 +1,61 @@
+"""The instruction sets of this processor, which decide what machine code it can run."""
+
+from __future__ import annotations
+
+import ctypes
+import platform
+import re
+import sys
+from functools import cache
+
+X86_64_V3 = frozenset({"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"})
+"""Names in Linux of what the level x86-64-v3 adds to the first one (its `lzcnt` is `abm` there)."""
+
+WINDOWS_AVX2 = 40
+"""PF_AVX2_INSTRUCTIONS_AVAILABLE of the Windows API."""
+
+
+@cache
+def machine_name() -> str:
+    """Return the kind of processor: "x86_64", "aarch64" or whatever the system calls it."""
+    name = platform.machine().lower()
+    return {"amd64": "x86_64", "x64": "x86_64", "arm64": "aarch64"}.get(name, name)
+
+
+@cache
+def processor_features() -> frozenset[str]:
+    """Return the names of the instruction sets of this processor; none where the system has no list of them."""
+    system: str = sys.platform
+    if system == "linux":
+        return _read_cpuinfo("/proc/cpuinfo")
+    if system == "darwin" and machine_name() == "x86_64":
+        return X86_64_V3 if _sysctl(b"hw.optional.avx2_0") else frozenset()
+    if system == "win32" and machine_name() == "x86_64":
+        has_avx2 = getattr(ctypes, "windll").kernel32.IsProcessorFeaturePresent(WINDOWS_AVX2)  # noqa: B009
+        return X86_64_V3 if has_avx2 else frozenset()
+    return frozenset()
+
+
+def supports_v3() -> bool:
+    """Return whether this processor runs machine code for x86-64-v3."""
+    return machine_name() == "x86_64" and processor_features() >= X86_64_V3
+
+
+def _read_cpuinfo(path: str) -> frozenset[str]:
+    """Return the features of the first processor that Linux lists."""
+    try:
+        with open(path, encoding="ascii", errors="replace") as stream:
+            # The list repeats for each core, and the first one is enough.
+            head = stream.read(8192)
+    except OSError:
+        return frozenset()
+    match = re.search(r"^(?:flags|Features)\s*:(.*)$", head, re.MULTILINE)
+    return frozenset(match[1].split()) if match else frozenset()
+
+
+def _sysctl(name: bytes) -> bool:
+    """Return whether macOS says yes to a question about the processor."""
+    value, size = ctypes.c_int(0), ctypes.c_size_t(ctypes.sizeof(ctypes.c_int))
+    system = ctypes.CDLL(None)
+    status = system.sysctlbyname(name, ctypes.byref(value), ctypes.byref(size), None, 0)
+    return status == 0 and value.value != 0

@@ -1,0 +1,110 @@
+"""The C++ compiler that is found, and what it is asked for."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from osimlite.codegen import toolchain
+from osimlite.codegen.processor import X86_64_V3 as V3_FEATURES
+from osimlite.codegen.processor import _read_cpuinfo
+from osimlite.codegen.toolchain import (
+    BASELINE,
+    NATIVE,
+    X86_64_V3,
+    CompilationError,
+    Compiler,
+    find_compiler,
+    find_cross_compiler,
+)
+
+GCC = Compiler(("g++",), "g++ 12", is_gcc=True, system="linux", machine="x86_64")
+CLANG = Compiler(("clang++",), "clang version 14", is_gcc=False, system="linux", machine="x86_64")
+
+
+@pytest.fixture
+def programs(tmp_path, monkeypatch):
+    """A search path that has only the compilers that a test puts there."""
+    if sys.platform == "win32":
+        pytest.skip("the programs are scripts of a shell")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CXX", raising=False)
+    monkeypatch.setattr(toolchain, "_has_developer_tools", lambda: True)
+    find_compiler.cache_clear()
+
+    def add(name, version, code=0):
+        path = tmp_path / name
+        path.write_text(f"#!/bin/sh\necho '{version}'\nexit {code}\n")
+        path.chmod(0o755)
+        return str(path)
+
+    yield add
+    find_compiler.cache_clear()
+
+
+def test_without_a_compiler(programs):
+    assert find_compiler() is None
+
+
+def test_clang_comes_before_gcc(programs):
+    programs("g++", "g++ (Debian) 12.2.0")
+    path = programs("clang++", "Debian clang version 14.0.6")
+    assert find_compiler() == Compiler((path,), "Debian clang version 14.0.6", is_gcc=False)
+
+
+def test_a_compiler_that_does_not_run_is_passed_over(programs):
+    programs("clang++", "clang version 14", code=1)
+    path = programs("g++", "g++ (Debian) 12.2.0")
+    found = find_compiler()
+    assert found.command == (path,) and found.is_gcc
+
+
+def test_the_variable_names_a_compiler_with_its_options(programs, monkeypatch):
+    programs("clang++", "clang version 14")
+    path = programs("zig", "clang version 22.1.8")
+    monkeypatch.setenv("CXX", f"{path} c++ -target x86_64-linux-gnu.2.17")
+    assert find_compiler().command == (path, "c++", "-target", "x86_64-linux-gnu.2.17")
+    for platform, system, machine in (
+        ("manylinux_2_17_aarch64", "linux", "aarch64"),
+        ("macosx_11_0_arm64", "darwin", "aarch64"),
+        ("macosx_11_0_x86_64", "darwin", "x86_64"),
+        ("win_amd64", "win32", "x86_64"),
+    ):
+        compiler = find_cross_compiler(platform)
+        assert (compiler.system, compiler.machine) == (system, machine)
+
+
+def test_results_are_those_of_python_whatever_the_target():
+    for compiler in (GCC, CLANG):
+        for target in (BASELINE, X86_64_V3, NATIVE):
+            flags = compiler.flags(target)
+            assert {"-ffp-contract=off", "-fno-fast-math", "-std=c++17"} <= {*flags}
+
+
+def test_targets():
+    assert GCC.targets == (X86_64_V3, BASELINE)
+    assert GCC._replace(machine="aarch64").targets == (BASELINE,)
+    assert "-march=native" in GCC.flags(NATIVE) and "-march=x86-64-v3" in CLANG.flags(X86_64_V3)
+    assert not any(flag.startswith("-march") for flag in GCC.flags(BASELINE))
+    assert "-mcpu=native" in GCC._replace(machine="aarch64").flags(NATIVE)
+    # Only g++ has limits of inlining that are too low.
+    assert any(flag.startswith("--param") for flag in GCC.flags(NATIVE))
+    assert not any(flag.startswith("--param") for flag in CLANG.flags(NATIVE))
+
+
+def test_an_error_of_the_compiler_is_one_sentence(programs, tmp_path):
+    path = programs("g++", "one\nlaw.cpp:3: error: what is this", code=1)
+    compiler = Compiler((path,), "g++ 12", is_gcc=True)
+    with pytest.raises(CompilationError, match="ended with 1"):
+        compiler.compile(tmp_path / "law.cpp", tmp_path / "law.o")
+
+
+def test_features_of_a_processor(tmp_path):
+    file = tmp_path / "cpuinfo"
+    file.write_text("processor\t: 0\nflags\t\t: fpu sse2 avx2\nbugs\t\t: none\n")
+    assert _read_cpuinfo(str(file)) == {"fpu", "sse2", "avx2"}
+    file.write_text("processor\t: 0\nFeatures\t: fp asimd\n")
+    assert _read_cpuinfo(str(file)) == {"fp", "asimd"}
+    assert _read_cpuinfo(str(tmp_path / "none")) == frozenset()
+    assert "avx2" in V3_FEATURES
