@@ -46,7 +46,7 @@ def pytest_configure(config: pytest.Config) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-ENGINES = {"bullet": "pybullet", "compiled": "numba"}
+ENGINES = {"bullet": "pybullet", "compiled": "numpy"}
 """Package of each engine."""
 
 

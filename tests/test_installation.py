@@ -52,13 +52,17 @@ def test_rerun_comes_where_it_has_a_wheel() -> None:
 
 def test_who_asks_for_pybullet_gets_it() -> None:
     for machine, python in [(HERE, "3.11"), (HERE, "3.13"), (MAC, "3.12")]:
-        assert {"pybullet", "numba", "numpy"} <= names("bullet", machine, python)
+        assert {"pybullet", "numpy"} <= names("bullet", machine, python)
 
 
 def test_numba_for_old_macs_is_the_last_with_wheels() -> None:
-    (only,) = [item for item in asked("sim", OLD_MAC, "3.12") if item.name == "numba"]
+    (only,) = [item for item in asked("jit", OLD_MAC, "3.12") if item.name == "numba"]
     assert not only.specifier.contains("0.63") and only.specifier.contains("0.62.1")
-    assert "numba" not in names("sim", OLD_MAC, "3.14")
+    assert "numba" not in names("jit", OLD_MAC, "3.14")
+
+
+def test_simulations_need_no_numba() -> None:
+    assert names("sim", HERE, "3.12") >= {"numpy", "scipy"} and "numba" not in names("sim", HERE, "3.12")
 
 
 def test_the_older_name_of_sim() -> None:

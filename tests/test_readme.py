@@ -20,7 +20,6 @@ def blocks(text: str, language: str) -> list[str]:
 
 
 def test_the_library_examples_run(repo: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     monkeypatch.chdir(tmp_path)
     osimlite.write(dynamic_walker(), "walker.osim")
     result = blocks((repo / "README.md").read_text(), "python")

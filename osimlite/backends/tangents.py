@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from osimlite._require import require
 from osimlite.backends.outputs import output_columns, probe_places, station_places
 from osimlite.backends.stated import StatedModel
 from osimlite.errors import UnsupportedError
@@ -21,13 +20,11 @@ from osimlite.records import replace
 from osimlite.schema.model import Model, expect_model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.engines.carrying import Carrying, carried_by
-from osimlite.simulation.engines.linking import Program, Tangents, has_compiler
+from osimlite.simulation.elements.laws import DIRECTIONS
+from osimlite.simulation.engines.carrying import Carrying, DualVector, carried_by
+from osimlite.simulation.engines.linking import Program, Tangents
 from osimlite.simulation.integrators import MERSON
 from osimlite.simulation.pack import Packed, pack
-
-DIRECTIONS = 16
-"""So many derivatives are carried at once."""
 
 
 def tangents(model: Model, parameters: Iterable[str] = (), folder: str | Path | None = None) -> TangentModel:
@@ -39,7 +36,6 @@ def tangents(model: Model, parameters: Iterable[str] = (), folder: str | Path | 
         folder: where the model's file is, for the files that it names; the folder that the program runs in if None.
 
     Raises:
-        MissingDependency: numba is not installed.
         ModelError: the model is not a mechanism.
         SettingError: there is no such number.
         UnsupportedError: a force is computed in Python, or a number cannot be a parameter; the message names it.
@@ -63,13 +59,10 @@ class Machine:
         w: the work vector.
 
     Raises:
-        MissingDependency: numba is not installed.
         UnsupportedError: a force is computed in Python.
     """
 
     def __init__(self, packed: Packed, forces: Forces, entries: Sequence[str], room: int = 0) -> None:
-        if not has_compiler():
-            require("numba", extra="sim", purpose="derivatives in machine code")
         for place, kernel in packed.kernels.items():
             if place in packed.owners and not isinstance(kernel, str):
                 path = forces.elements[packed.owners[place]].path
@@ -276,22 +269,11 @@ class Seen:
     on = staticmethod(carried_by)
 
     def __init__(self, model: Any, reals: Array, data: Array) -> None:
-        self.model, self.reals, self.data = model, Rows(reals), Rows(data)
+        self.model, self.reals, self.data = model, DualVector(reals), DualVector(data)
 
     def sure(self, numbers: Sequence[Any]) -> list[Any]:
         """Numbers as they are: where the evaluation fails, nobody looks."""
         return [*numbers]
-
-
-class Rows:
-    """A vector of such numbers, which are made of rows where they are asked for."""
-
-    def __init__(self, rows: Array) -> None:
-        self._rows = rows
-
-    def __getitem__(self, place: Any) -> Any:
-        own = self._rows[place]
-        return Rows(own) if isinstance(place, slice) else Carrying(float(own[0]), own[1:].tolist())
 
 
 class Steps:

@@ -30,6 +30,9 @@ ALIASES = {"run-tool": "run"}
 COMPLETING = "_OSIMLITE_COMPLETE"
 """Set by a shell that asks how a word can go on."""
 
+VERSION = {"--version", "--verbose", "-v"}
+"""Words that ask for the version."""
+
 
 def app(names: Sequence[str] = COMMANDS) -> Typer:
     """Assemble the command line of these commands."""
@@ -48,9 +51,12 @@ def app(names: Sequence[str] = COMMANDS) -> Typer:
         application.command(name, help=_flowing(command.__doc__ or ""))(command)
 
     @application.callback(invoke_without_command=True)
-    def osimlite(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
+    def osimlite(
+        version: bool = typer.Option(False, "--version", help="Print the version and stop."),
+        verbose: bool = typer.Option(False, "--verbose", "-v", help="With --version: say what runs the kernels."),
+    ) -> None:
         if version:
-            _tell_version()
+            _print_version(verbose=verbose)
             raise typer.Exit
 
     return application
@@ -61,11 +67,17 @@ def _loaded(name: str) -> Command:
     return getattr(import_module(f"osimlite.cli.{function}"), function)
 
 
-def _tell_version() -> None:
+def _print_version(*, verbose: bool) -> None:
+    """Print the version, and if asked what runs the kernels and why."""
     from osimlite import __version__
     from osimlite.cli._console import say
 
     say(f"osimlite {__version__}")
+    if verbose:
+        from osimlite.cli._kernels import explain_kernels
+
+        for sentence in explain_kernels():
+            say(sentence)
 
 
 def _flowing(text: str) -> str:
@@ -122,13 +134,13 @@ def _run(words: list[str]) -> None:
     # Only the command that is asked for is loaded; without one, all are, for the help.
     names = words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS
     try:
-        if words == ["--version"]:
-            _tell_version()
+        if "--version" in words and {*words} <= VERSION:
+            _print_version(verbose=len({*words}) > 1)
             return
         if sys.stderr.isatty():
-            from osimlite.cli._progress import tell_of_compiling
+            from osimlite.cli._progress import show_warnings_of_engine
 
-            tell_of_compiling()
+            show_warnings_of_engine()
         with warnings.catch_warnings():
             shown = warnings.showwarning
             warnings.showwarning = lambda message, category, *place: (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -79,38 +78,15 @@ def progress_bars() -> Iterator[Callable[[str, float, float], None]]:
         yield tell
 
 
-def tell_of_compiling() -> None:
-    """Let people know why a motion takes so long: the first use of the compiled engine, or one without a compiler."""
+def show_warnings_of_engine() -> None:
+    """Show people what the engine warns of: that kernels run as Python, or that machine code can be kept nowhere."""
     import logging
 
-    class Said(logging.Handler):
+    class Shown(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             complain(record.getMessage())
 
-    logging.getLogger("osimlite.simulation.engines.linking").addHandler(Said())
-
-    bar = ExitStack()
-    # Whatever ends the program, the terminal gets its cursor back.
-    atexit.register(bar.close)
-
-    class Part(logging.Handler):
-        is_told, advance = False, staticmethod(_silent)
-
-        def emit(self, record: logging.LogRecord) -> None:
-            part: float = record.__dict__["part"]
-            if not self.is_told:
-                complain("compiling the engine, which this machine keeps; it takes some ten seconds")
-            if self.advance is _silent:
-                self.advance = bar.enter_context(progress_bar("compiling the engine", 1.0))
-            self.is_told = True
-            self.advance(part)
-            if part >= 1.0:
-                bar.close()
-                self.advance = _silent
-
-    log = logging.getLogger("osimlite.simulation.engines.machine_code")
-    log.setLevel(logging.INFO)
-    log.addHandler(Part())
+    logging.getLogger("osimlite.simulation.engines").addHandler(Shown())
 
 
 def _silent(*_: float) -> None:

@@ -74,8 +74,7 @@ def run(
         count, left, failed = _mend_all(files, given, unsafe=unsafe_fixes)
         say(f"Mended {counted(count, 'place')}{_more(left)}.", err=True)
     with progress_bar("checking", len(files)) as progress:
-        # Somebody who looks on is told what is not measured yet.
-        report = check_files(files, given, cached=not no_cache, waits=not sys.stderr.isatty(), progress=progress)
+        report = check_files(files, given, cached=not no_cache, progress=progress)
     report.passed = passed
     if write_baseline is not None:
         from osimlite.lint.baseline import write_baseline as write

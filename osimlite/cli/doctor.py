@@ -16,6 +16,7 @@ from osimlite._cores import cores
 from osimlite._require import SAFE_PATH
 from osimlite.cli._command import Argument, command
 from osimlite.cli._console import add_row, plain_console, plain_table, say
+from osimlite.cli._kernels import explain_kernels
 from osimlite.cli._progress import progress_bar
 
 NEEDS: dict[str, tuple[str, ...]] = {
@@ -35,7 +36,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "run": ("numpy",),
     "view": ("numpy",),
     "gait": ("numpy",),
-    "simulate --engine compiled": ("numpy", "numba"),
+    "kernels without a library or a C++ compiler": ("numba",),
     "simulate --engine bullet": ("numpy", "pybullet"),
     "simulate --gui": ("numpy", "pybullet"),
     "simulate --plot": ("numpy", "matplotlib"),
@@ -61,6 +62,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
 EXTRAS = (
     "",
     "sim",
+    "jit",
     "bullet",
     "view",
     "plot",
@@ -112,6 +114,8 @@ def doctor(
         raise MissingFileError("there is no such file or folder", file=str(model))
     say(f"osimlite {__version__}, Python {sys.version.split()[0]}, {sys.platform}")
     say(f"installed in {Path(__file__).parents[2]}")
+    for sentence in explain_kernels():
+        say(sentence)
     say()
 
     wanted = requirements()

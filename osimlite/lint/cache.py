@@ -112,7 +112,7 @@ def key_of(file: str, config: Config) -> str:
     thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
     setting = (
         _code(), file, os.getcwd(), config.select, config.ignore, severity, config.mesh_paths, thresholds,
-        [(path, stamped(path)) for path in config.classes], config.target_version, absent("numpy", "numba"),
+        [(path, stamped(path)) for path in config.classes], config.target_version, absent("numpy"),
     )  # fmt: skip
     return ascii(setting)
 

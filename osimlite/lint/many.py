@@ -39,7 +39,6 @@ def check_files(
     given: Config,
     *,
     cached: bool = True,
-    waits: bool = True,
     processes: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
@@ -49,7 +48,6 @@ def check_files(
         files: paths, ``-`` for standard input.
         given: what comes before the settings of the project.
         cached: whether findings of files that have not changed are taken from the cache, and new ones kept there.
-        waits: whether machine code that is in no file yet is waited for, where something is measured.
         processes: how many processes to use; if not given, as many as there is work for.
         progress: called with the number of files done and that of all.
 
@@ -76,10 +74,6 @@ def check_files(
             jobs.append(job)
         else:
             result[file] = known
-    if jobs:
-        from osimlite.lint import measures
-
-        measures.waits = waits
     for count, (job, report) in enumerate(_checked(jobs, processes), len(result) + 1):
         result[job.file] = report
         if progress is not None:

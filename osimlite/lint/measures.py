@@ -145,13 +145,8 @@ def swept_places(measures: Measures) -> set[int]:
     return {place for places in measures.swept.values() for place in places}
 
 
-class NotYetError(OsimliteError):
-    """What it takes to measure a model is being made."""
-
-
-waits = True
-"""Whether machine code that is in no file yet is waited for: some ten seconds, once. Programs do; people at a terminal
-and editors are told, while another process makes it."""
+class NoMachineCodeError(OsimliteError):
+    """A model cannot be measured in a reasonable time, since kernels run as Python only."""
 
 
 def has_measures(subject: Subject) -> bool:
@@ -170,7 +165,7 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
     from osimlite.schema.tree import lent
 
     compiles = sum(1 for _ in subject.named("PathWrap")) > FEW
-    missing = absent("numpy", "numba") if compiles else absent("numpy")
+    missing = absent("numpy")
     if missing:
         verb = "is" if len(missing) == 1 else "are"
         return f"{NEEDS_SIM} ({listed(missing)} {verb} not installed); run: pip install 'osimlite[sim]'"
@@ -186,11 +181,10 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
     try:
         measured = import_module("osimlite.measuring").measured
         assert subject.model is not None
-        may_wait = waits and subject.waits
         known_of = None if parts is None or known is None else (known.measures, known.of(parts))
         with lent(subject.tree):
-            result = measured(subject.model, compiles=compiles, waits=may_wait, known=known_of)
-    except NotYetError as error:
+            result = measured(subject.model, compiles=compiles, known=known_of)
+    except NoMachineCodeError as error:
         subject.is_unsettled = True
         return error.message
     except (ArithmeticError, ValueError, OsimliteError) as error:

@@ -48,8 +48,8 @@ def once(make: Callable[Concatenate[S, P], Made]) -> Callable[Concatenate[S, P],
 class Subject(Checked):
     """One model under check. `source` is None for a model made in Python, `model` for a text that cannot be read.
 
-    `top` is the object at the top of the document, whatever it is; `kept_in` the folder for what is measured of it. It
-    `waits` for machine code; if not, and that is not there, it `is_unsettled`: the next check may find more.
+    `top` is the object at the top of the document, whatever it is; `kept_in` the folder for what is measured of it. If
+    there was no machine code to measure it with, it `is_unsettled`: the next check may find more.
     """
 
     def __init__(self, found: Survey | Model, config: Config | None = None) -> None:
@@ -62,7 +62,7 @@ class Subject(Checked):
         self.refusals: list[Refusal] = []
         self.kept: dict[object, object] = {}
         self.kept_in: Path | None = None
-        self.waits, self.is_unsettled = True, False
+        self.is_unsettled = False
         if isinstance(found, Model):
             self.model = self.top = found
         else:

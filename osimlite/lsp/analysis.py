@@ -109,16 +109,13 @@ class Analysis:
             return False
         return any(known.about == MEASURES and subject.is_for(known) for known in all_rules())
 
-    def measured(self) -> Report | None:
-        """What the rules find once paths and muscles are measured; None as long as what that takes is being made.
+    def measured(self) -> Report:
+        """What the rules find once paths and muscles are measured.
 
         For another thread: it reads the text anew, and shares nothing with who answers questions meanwhile.
         """
         source = Source.of_characters(self.text.content, self.file)
-        subject = Subject(survey(source, of=Model), self.config)
-        subject.waits = False
-        report = run(subject)
-        return None if subject.is_unsettled else report
+        return run(Subject(survey(source, of=Model), self.config))
 
     @property
     def is_checked(self) -> bool:

@@ -34,8 +34,6 @@ LONGEST_PAUSE = 2.0
 """Of a file whose check takes long, s."""
 MEASURING_PAUSE = 1.0
 """Paths and muscles are measured, in another thread, when nothing has been typed for so long, s."""
-MAKING_PAUSE = 20.0
-"""And again if what that takes was still being made, s."""
 
 
 class Asked(typing.Protocol):
@@ -117,8 +115,7 @@ class Server(LanguageServer):
     async def _measure(self, uri: str, analysis: Analysis) -> None:
         await asyncio.sleep(MEASURING_PAUSE)
         try:
-            while (report := await asyncio.to_thread(analysis.measured)) is None:
-                await asyncio.sleep(MAKING_PAUSE)
+            report = await asyncio.to_thread(analysis.measured)
         except Exception as error:
             self.report_server_error(error, FeatureRequestError)
             return

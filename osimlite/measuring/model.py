@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from osimlite.lint.measures import LengthOnSurface, Measures, NotYetError, Pose, swept_places, together
+from osimlite.lint.measures import LengthOnSurface, Measures, NoMachineCodeError, Pose, swept_places, together
 from osimlite.measuring.jumps import jumps
 from osimlite.measuring.muscles import fibers_of, reach_of, start_of
 from osimlite.measuring.points import moving_points
@@ -16,49 +16,49 @@ from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.gather import GEODESIC
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
-from osimlite.simulation.engines import ahead
 from osimlite.simulation.engines.linking import AT_HAND
+from osimlite.simulation.engines.machine_code import has_machine_code
 from osimlite.simulation.paths import Paths
 
-TOLD = "machine code for so many surfaces is being made, which takes some ten seconds and is done once; run it again"
+NEEDS_MACHINE_CODE = (
+    "so many surfaces take minutes in Python: install osimlite where a C++ compiler is found, "
+    "or run: pip install 'osimlite[jit]'"
+)
+"""Why paths around many surfaces are not measured."""
 
 MIDDLE = 0.5
 """Part of a range in which fibers are looked at: at the ends, few muscles have not reached a limit."""
 
 
 @np.errstate(all="ignore")
-def measured(
-    model: Model, *, compiles: bool, waits: bool = True, known: tuple[Measures, Measures] | None = None
-) -> Measures:
+def measured(model: Model, *, compiles: bool, known: tuple[Measures, Measures] | None = None) -> Measures:
     """Measure the paths and muscles of a model.
 
     Args:
         model: what is measured.
-        compiles: whether machine code is made that is in no file yet, which takes longer than to do without for a
-            model that has few surfaces.
-        waits: whether it is waited for; else another process makes it.
+        compiles: whether kernels that are in no library or file yet are compiled, which takes longer than to do
+            without for a model that has few surfaces.
         known: what was measured when some paths were others, or not there, and all else as it is; and what still holds.
 
     Raises:
         UnsupportedError: a path, a joint or a constraint cannot be computed.
         ModelError: something makes no sense.
         SimulationError: the constraints allow no default pose, or there are no lengths in it.
-        NotYetError: machine code is not there, and not waited for.
+        NoMachineCodeError: the model has many surfaces, and kernels run as Python only.
     """
     before, still = known if known is not None else (None, None)
-    code = AT_HAND if not compiles else None if waits or not ahead.is_possible() else ahead.Later()
+    if compiles and not has_machine_code():
+        raise NoMachineCodeError(NEEDS_MACHINE_CODE)
+    code = None if compiles else AT_HAND
     paths = Paths(model, code=code, left_out=still.swept if still is not None else ())
     has_surfaces = any(isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values())
     around = paths.around_surfaces(model, GEODESIC, code) if has_surfaces else None
-    if isinstance(code, ahead.Later) and code.missing:
-        ahead.begin(code.missing)
-        raise NotYetError(TOLD)
     start = paths.mechanism.assemble({})
     default = np.array(list(paths.lengths(start).values()))
     looked_at = sweeps(paths, start, set() if still is None else swept_places(still))
     if before is not None and {sweep.place for sweep in looked_at} != swept_places(before):
         # All paths are looked at in the same poses.
-        return measured(model, compiles=compiles, waits=waits)
+        return measured(model, compiles=compiles)
     starts, reaches = [], []
     ends = dict(zip(paths.names, zip(default, _ends(looked_at, default), strict=True), strict=True))
     for fibers in fibers_of(model, paths.mechanism, ends):

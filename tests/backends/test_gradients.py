@@ -15,8 +15,6 @@ from osimlite.sweep.plan import plan
 from osimlite.sweep.runner import Runner
 from tests.backends.test_sensitivity import human, pendulum
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 
 def swing(run):
     """The angle that is reached, and what it cost."""

@@ -33,19 +33,17 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 import osimlite
-from osimlite.backends.tangents import DIRECTIONS
-from osimlite.errors import SettingError, SimulationError, UnsupportedError
+from osimlite.codegen.toolchain import CompilationError
+from osimlite.errors import SettingError, SimulationError
 from osimlite.forces.carried import is_nothing, settled
 from osimlite.kernels.pointers import Floats, Ints, at
 from osimlite.kernels.table import LAW_MODULES
 from osimlite.models.jumper import jumper
 from osimlite.models.walkers import furthest_walker
 from osimlite.simulation.elements.kind import Kind, kinds
-from osimlite.simulation.elements.laws import ALONG, RIGID
-from osimlite.simulation.engines import compiler, object_code
+from osimlite.simulation.elements.laws import ALONG, DIRECTIONS, RIGID, WITHOUT_DERIVATIVES
+from osimlite.simulation.engines.compiled_laws import compile_function
 from osimlite.simulation.engines.machine_code import make_ready
 from osimlite.simulation.pack import pack
 from tests.backends.jets import Jet, _carried, carried
@@ -110,8 +108,7 @@ searched.__module__ = "osimlite.canary"
 
 @cache
 def machine_code(function):
-    text, symbol = compiler.compiled(function, WAYS)
-    address = object_code._link(object_code.translated(text), symbol)
+    address = compile_function(function.__name__, function, WAYS)
     code = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 5, ctypes.c_int64)(address)
 
     def called(count, x, y):
@@ -132,8 +129,8 @@ strange.__module__ = "osimlite.canary"
 
 
 def test_what_has_no_rule_is_refused_by_name():
-    with pytest.raises(UnsupportedError, match=r"'strange' has no derivatives: No implementation of .*lgamma"):
-        compiler.compiled(strange, WAYS)
+    with pytest.raises(CompilationError, match=r"'strange' cannot be compiled: .*lgamma"):
+        compile_function("strange", strange, WAYS)
 
 
 numbers = st.floats(-3.0, 3.0), st.floats(0.05, 4.0)
@@ -171,25 +168,7 @@ def test_a_root_has_the_derivatives_of_its_equation():
     assert found[1] == pytest.approx([2.0, 0.25, 0.0, 0.5], abs=1e-15)
 
 
-NO_RATES = {
-    **dict.fromkeys(
-        ("run_several", "hold_several", "walk_several", "run_by_reflexes"),
-        "whole motions, which are followed step by step",
-    ),
-    **dict.fromkeys(("euler2", "adams", "bdf", "rosenbrock"), "methods that no derivatives are followed along"),
-    **dict.fromkeys(
-        ("fit_frames", "assemble_poses", "least_effort", "watch", "look", "push_each"),
-        "searches and looks at many poses",
-    ),
-    **dict.fromkeys(("equilibrate", "project"), "what finds a start, which is held"),
-    **{name: "curves of paths, for pictures" for name in LAW_MODULES if name.startswith("trace_")},
-    **dict.fromkeys(
-        ("contact_response", "smooth_contact_response", "contact_places"),
-        "what methods for stiff motions ask, and pictures",
-    ),
-}
-"""Kernels that nobody needs derivatives from, and why."""
-OF_RATES = [name for name in LAW_MODULES if name not in NO_RATES]
+OF_RATES = [name for name in LAW_MODULES if name not in WITHOUT_DERIVATIVES]
 OF_RATES += [
     kind.name + form for kind in kinds() if isinstance(kind, Kind) for form in ("", RIGID)[: 1 + bool(kind.rigid)]
 ]

@@ -85,7 +85,7 @@ def test_the_file_holds_what_was_accepted(tmp_path: Path, monkeypatch: pytest.Mo
 @pytest.mark.skipif(not cost.ACCEPTED.exists(), reason="no costs are accepted yet")
 def test_no_action_became_dearer() -> None:
     """To accept other costs: python benchmarks/cost.py --accept, and say in the commit why."""
-    for package in ("numba", "mujoco"):
+    for package in ("mujoco",):
         pytest.importorskip(package)
     versions, old = cost.accepted()
     said = compared(old, cost.measured(), same_versions=versions == cost.versions())

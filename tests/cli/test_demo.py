@@ -13,7 +13,6 @@ import osimlite
 from tests.cli.command import run
 
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra 'plot')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 
 def test_the_whole_tour(tmp_path: Path) -> None:

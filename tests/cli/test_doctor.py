@@ -44,7 +44,7 @@ def test_every_extra_has_a_purpose() -> None:
 
 
 def test_a_use_belongs_to_the_first_extra_that_brings_all_it_needs() -> None:
-    wanted = {"": ["lxml"], "sim": ["numba", "numpy"], "view": ["numpy", "pillow"], "more": ["numpy", "pillow"]}
+    wanted = {"": ["lxml"], "sim": ["numpy"], "view": ["numpy", "pillow"], "more": ["numpy", "pillow"]}
     result = purposes(wanted)
     assert "validate" in result[""] and "kinematics" in result["sim"] and "view --screenshot" in result["view"]
     assert not any("optimize" in uses for uses in result.values())

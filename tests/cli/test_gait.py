@@ -10,8 +10,6 @@ import pytest
 import osimlite
 from osimlite.cli import main
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 
 def run(*words: str) -> int:
     try:

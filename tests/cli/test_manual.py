@@ -70,7 +70,6 @@ def test_whatever_raises_errors_has_a_page():
     ],
 )
 def test_the_page_is_that_of_what_failed(words, page, tmp_path, monkeypatch, capsys):
-    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     monkeypatch.chdir(tmp_path)
     Path("damaged.osim").write_text("<OpenSimDocument>")
     osimlite.write(import_module("osimlite.models.dynamic_walker").dynamic_walker(), "walker.osim")

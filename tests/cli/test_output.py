@@ -78,8 +78,6 @@ def check(text: str) -> None:
     ids=lambda words: " ".join(word for word in words if word.isalnum())[:30],
 )  # fmt: skip
 def test_nothing_that_people_read_is_obeyed(folder: Path, words: list[str]) -> None:
-    if words[0] in ("simulate", "kinematics"):
-        pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     _, out, err = call(folder, *words)
     check(out.decode())
     check(err.decode())

@@ -205,7 +205,6 @@ def test_what_a_motion_goes_on_from_is_not_replaced(tmp_path):
 @pytest.fixture(scope="module")
 def without_pybullet(tmp_path_factory: pytest.TempPathFactory) -> BareEnvironment:
     """An environment with the extra `sim` alone, in which PyBullet is not installed."""
-    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     return BareEnvironment(tmp_path_factory.mktemp("sim") / "environment", ("sim",))
 
 

@@ -11,7 +11,6 @@ import pytest
 import osimlite
 from osimlite.cli import main
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytest.importorskip("scipy", reason="needs scipy (extra 'sweep')")
 pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
 

@@ -15,7 +15,6 @@ from osimlite.multibody.constraints import Lock
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.engines.protocol import Settings
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
 from osimlite.simulation.engines.bullet.engine import make

@@ -81,7 +81,7 @@ def shell(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
     ],
 )
 def test_every_block_runs(page: str, tmp_path: Path, shell: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
-    for package in ("numba", "matplotlib"):
+    for package in ("matplotlib",):
         pytest.importorskip(package, reason=f"needs {package} (extra 'all')")
     folder = tmp_path / "work"
     folder.mkdir()

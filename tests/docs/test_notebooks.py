@@ -22,7 +22,7 @@ SHOWN = {
 """What the outputs of each must have among them."""
 
 # They are loaded by the tests: every process of pytest collects all of these.
-for package in ("ipykernel", "nbclient", "numba", "matplotlib", "xarray", "cma", "mujoco", "mkdocs"):
+for package in ("ipykernel", "nbclient", "matplotlib", "xarray", "cma", "mujoco", "mkdocs"):
     if find_spec(package) is None:
         pytest.skip(f"needs {package} (extra 'dev')", allow_module_level=True)
 

@@ -11,16 +11,13 @@ from typer.testing import CliRunner
 
 from osimlite.cli import app
 from osimlite.errors import OsimliteError
-from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.models.walkers import human_walker, steady_walker
-from osimlite.simulation import Simulation
-
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 from osimlite.gait.basin import find_basin, perturbed, walks_from
 from osimlite.gait.cycle import find_cycle, step_matrix
 from osimlite.gait.stepmap import StepMap
 from osimlite.gait.steps import along_slope, walk_many
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.models.walkers import human_walker, steady_walker
+from osimlite.simulation import Simulation
 
 
 @pytest.fixture(scope="module")

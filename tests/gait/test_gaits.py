@@ -20,7 +20,6 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.simulation import Simulation
 from osimlite.sweep.plan import plan
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytest.importorskip("pyarrow", reason="needs pyarrow (extra 'sweep')")
 pytest.importorskip("scipy", reason="needs scipy (extra 'sweep')")
 

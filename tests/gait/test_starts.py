@@ -5,14 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.simulation import Simulation
-
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 from osimlite.gait.foot_contacts import find_footing
 from osimlite.gait.starts import carriers, planted, stood, upright
 from osimlite.gait.steps import along_slope
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.simulation import Simulation
 
 
 @pytest.fixture(scope="module")

@@ -7,15 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from osimlite.models.walkers import steady_walker
-from osimlite.schema.forces import CoordinateLimitForce
-from osimlite.simulation import Simulation
-
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 from osimlite.gait.cycle import find_cycle
 from osimlite.gait.stepmap import StepMap
 from osimlite.gait.symmetry import exchange_auxiliary
+from osimlite.models.walkers import steady_walker
+from osimlite.schema.forces import CoordinateLimitForce
+from osimlite.simulation import Simulation
 
 
 def test_a_walker_that_counts_energy_walks_as_before():

@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 
 from osimlite.errors import OsimliteError
+from osimlite.gait import steps
+from osimlite.gait.foot_contacts import FootContacts, find_footing
+from osimlite.gait.steps import Walk, along_slope, walk_many
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.simulation import Simulation
-
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
-from osimlite.gait import steps
-from osimlite.gait.foot_contacts import FootContacts, find_footing
-from osimlite.gait.steps import Walk, along_slope, walk_many
 from osimlite.simulation.run import simulate
 
 FEET = (("RFootForce",), ("LFootForce",))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 gymnasium = pytest.importorskip("gymnasium", reason="needs gymnasium (extra 'gym')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 

@@ -7,7 +7,6 @@ import pytest
 
 gymnasium = pytest.importorskip("gymnasium", reason="needs gymnasium (extra 'gym')")
 cma = pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 import osimlite.gym  # noqa: E402, F401
 

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from osimlite._require import absent
 from osimlite.document.source import Source
 from osimlite.lint import Config, measures, parts, validate
 from osimlite.lint.many import check_files
@@ -132,26 +131,14 @@ def test_a_value_is_told_in_the_unit_of_what_the_coordinate_moves(motion, said):
     assert str(measures.Value(info.name, 0.5, info.unit)) == f"'q' = {said}"
 
 
-@pytest.fixture
-def begun(monkeypatch):
-    """Nothing is compiled, and what would be is noted here."""
-    from osimlite.simulation.engines import ahead, machine_code
+def test_without_machine_code_many_surfaces_are_not_measured(jumping, monkeypatch):
+    """The report says so, and is not kept: the next check may have some."""
+    from osimlite.measuring import model
 
-    names: list[str] = []
-    monkeypatch.setattr(machine_code, "is_at_hand", lambda name: False)
-    monkeypatch.setattr(ahead, "begin", names.extend)
     monkeypatch.setattr(measures, "FEW", -1)
-    monkeypatch.setattr(measures, "waits", False)
     parts._memory.clear()
-    return names
-
-
-@pytest.mark.skipif(bool(absent("numba")), reason="numba is not installed")
-def test_nobody_who_looks_on_waits_for_a_compiler(jumping, begun, monkeypatch):
-    report = check_files([str(jumping)], Config(), waits=False)
-    (why,) = report.unmeasured
-    assert "machine code" in why and "run it again" in why
-    assert not report.findings and {"evaluate", "watch", "straight_path"} <= set(begun)
-    monkeypatch.undo()
-    parts._memory.clear()
+    with monkeypatch.context() as without:
+        without.setattr(model, "has_machine_code", lambda: False)
+        (why,) = check_files([str(jumping)], Config()).unmeasured
+        assert "minutes in Python" in why and "osimlite[jit]" in why
     assert check_files([str(jumping)], Config()).codes == {"OSIM632": 2}

@@ -7,8 +7,6 @@ import pytest
 
 from osimlite.lint import validate
 from osimlite.models.jumper import MUSCLES, jumper
-
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 from osimlite.simulation import Simulation
 
 HEIGHT, AT = 1.2796091, 0.48

@@ -34,7 +34,6 @@ def test_the_furthest_walker_is_the_exercise_but_for_its_start():
 
 @pytest.mark.parametrize("accuracy", [1e-5, 1e-6, 1e-9])
 def test_the_furthest_walker_makes_four_steps(accuracy):
-    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     from osimlite.gait.steps import along_slope, walk_many
 
     with Simulation(furthest_walker(), "compiled") as simulation:

@@ -107,7 +107,6 @@ def test_it_moves_and_is_recorded(file, engine):
 
 
 def test_the_muscle_plot_tells_its_forces(file):
-    pytest.importorskip("numba")
     from osimlite.simulation.muscle_curves import muscle_curves
 
     curves = muscle_curves(osimlite.read(file), {"x": (0.25, 0.3)}, activation=1.0)

@@ -22,7 +22,6 @@ from tests.oracle.opensim_runs import simulated
 from tests.simulation.elements.muscle_rows import MASS, hung, line
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
 STATES = 6

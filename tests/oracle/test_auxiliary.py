@@ -12,7 +12,6 @@ from tests.simulation.damped import damped
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
 

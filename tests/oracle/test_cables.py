@@ -23,7 +23,6 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.opensim_runs import put  # noqa: E402

@@ -9,7 +9,6 @@ import osimlite
 from osimlite.simulation import Simulation
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
 UNTIL, ACCURACY, STARTS = 1.0, 1e-9, 20

@@ -77,7 +77,6 @@ def counts(integrator):
 def test_the_walkers_steps_are_opensims(walker, accuracy, expected, code):
     times, last, measured = manager_run(walker, 2.0, accuracy)
     f, y0 = dynamics(walker, walker.initSystem())
-    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     given = {} if accuracy is None else {"accuracy": accuracy}
     integrator = runge_kutta_merson(f, 0.0, y0, 8, code=code, **given)
     steps = list(integrator.steps(2.0))
@@ -186,7 +185,6 @@ def test_a_free_joint_counts_one_coordinate_more():
 )
 def test_semi_explicit_steps_are_simbody_s(fixtures, path, until, accuracy):
     """Contact, balls, constraints, muscles."""
-    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     method = opensim.Manager.IntegratorMethod_SemiExplicitEuler2
     model = opensim.Model(str(fixtures / path))
     times, last, (taken, attempted, _) = manager_run(model, until, accuracy, method)

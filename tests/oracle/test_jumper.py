@@ -9,7 +9,6 @@ from osimlite.models.jumper import jumper
 from osimlite.simulation import Simulation
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 from tests.oracle.opensim_runs import simulated
 
 pytestmark = pytest.mark.oracle

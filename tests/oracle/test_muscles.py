@@ -24,7 +24,6 @@ from osimlite.simulation.engines.compiled import CompiledEngine
 from tests.simulation.elements.muscle_rows import hung, line
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
 USUAL = {"max_isometric_force": 700.0, "optimal_fiber_length": 0.06, "tendon_slack_length": 0.2}

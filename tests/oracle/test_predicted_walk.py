@@ -16,7 +16,6 @@ from benchmarks.predicted_walk import forward
 from osimlite.simulation.files.storage import read_sto
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytestmark = [pytest.mark.oracle, pytest.mark.skipif(find_spec("casadi") is None, reason="needs the casadi package")]
 
 

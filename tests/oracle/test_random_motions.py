@@ -12,7 +12,6 @@ from tests.oracle.random_models import RandomModel
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
 

@@ -13,7 +13,6 @@ from osimlite import Body, Model
 from osimlite.models.arm import arm
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
 STEP, OFFSET = 0.005, (0.1, -0.2, 0.3)

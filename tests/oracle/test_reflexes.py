@@ -8,7 +8,6 @@ from osimlite.models.walking import write_scenario
 from osimlite.reflexes.scenario import Scenario
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytestmark = pytest.mark.oracle
 
 

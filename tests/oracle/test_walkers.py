@@ -15,7 +15,6 @@ import osimlite
 from osimlite.simulation import Simulation
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 from benchmarks._opensim_walks import Order, opensim_walks
 from osimlite.gait.steps import walk_many
 

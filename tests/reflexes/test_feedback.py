@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.gym.tasks import arm as task

@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 from osimlite.models.walking import write_scenario
 from osimlite.reflexes.gait import gait_of, strides_of
 from osimlite.reflexes.scenario import Scenario

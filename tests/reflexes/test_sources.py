@@ -6,8 +6,6 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.models.arm import arm

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 from osimlite.errors import SimulationError
 from osimlite.kernels.layout import MODEL, RUN
 from osimlite.models.jumper import jumper

@@ -56,7 +56,6 @@ def test_files_and_fixed_steps(engine, tmp_path):
 
 
 def test_many_runs_equal_single_ones():
-    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     from osimlite.simulation.many import run_many
 
     times = [0.0, 0.07, 0.2, 0.3]

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 
 from osimlite import Coordinate, Model
 from osimlite.errors import SimulationError, UnsupportedError
+from osimlite.kernels import least_squares as ls
+from osimlite.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.multibody import Mechanism, build_mechanism
 from osimlite.multibody import functions as f
 from osimlite.multibody.constraints import Coupler, Prescribed
@@ -19,19 +21,14 @@ from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.functions import Sine
 from osimlite.simulation import Simulation, simulate
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.engines.protocol import Settings
-from tests.multibody.strategies import KINDS, Case, cases, constraint_of
-from tests.simulation.test_constrained import MODELS, four_bars, knee, patella, pins
-
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
-from osimlite.kernels import least_squares as ls
-from osimlite.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON
+from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.many import ENDINGS, Watch, run_many
 from osimlite.simulation.system import System
+from tests.multibody.strategies import KINDS, Case, cases, constraint_of
+from tests.simulation.test_constrained import MODELS, four_bars, knee, patella, pins
 
 
 def accelerations(mechanism: Mechanism, q: Any, u: Any, t: float = 0.0) -> Any:

@@ -20,7 +20,6 @@ from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.kind import kinds as declared_kinds
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
 from osimlite.kernels.layout import OUTCOME, STAGE

@@ -11,13 +11,10 @@ from osimlite.schema.contact_forces import ElasticFoundationForce
 from osimlite.simulation.elements.foundation import Springs
 from osimlite.sweep import registry
 from osimlite.sweep.plan import plan
-from tests.simulation.meshes import ball, block, write_obj
-from tests.simulation.test_mesh_contact import thrown
-
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 from tests.simulation.force_cases import chain, floor
+from tests.simulation.meshes import ball, block, write_obj
 from tests.simulation.test_compiled_forces import assert_same, engines, states
+from tests.simulation.test_mesh_contact import thrown
 
 
 def touching(surfaces) -> ElasticFoundationForce:

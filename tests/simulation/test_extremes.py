@@ -12,9 +12,6 @@ from hypothesis import strategies as st
 import osimlite
 from osimlite import to_text
 from osimlite.errors import ModelError, OsimliteError, SettingError, SimulationError
-
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
-
 from tests.simulation.force_cases import FORCES, with_force
 
 NUMBERS = re.compile(r"<(\w+)>([-+0-9.eE \n\t]*\d[-+0-9.eE \n\t]*)</\1>")

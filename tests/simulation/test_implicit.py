@@ -26,8 +26,6 @@ from tests.simulation.elements.muscle_rows import hung, muscle
 from tests.simulation.equations import Equations, last, oscillator
 from tests.simulation.test_constrained import MODELS
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 METHODS = "adams", "bdf", "rosenbrock"
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import osimlite
 from osimlite.simulation import run
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.engines.linking import has_compiler
+from osimlite.simulation.engines.machine_code import has_machine_code
 
 WALKER = "fixtures/walker/DynamicWalkerModel.osim"
 
@@ -154,7 +154,7 @@ def test_threads_do_not_meet_in_one_model(repo):
             assert np.array_equal(values, mine) and np.array_equal(energy, own)
 
 
-@pytest.mark.skipif(not has_compiler(), reason="as Python the kernels take the time of many calls")
+@pytest.mark.skipif(not has_machine_code(), reason="as Python the kernels take the time of many calls")
 def test_a_model_that_has_moved_moves_in_one_call(repo, monkeypatch):
     calls = []
     whole = Batch.run

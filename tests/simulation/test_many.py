@@ -10,9 +10,6 @@ import pytest
 import osimlite
 from osimlite.errors import ModelError, OsimliteError, SettingError
 from osimlite.simulation import Simulation
-
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 from osimlite.simulation.many import ENDINGS, Watch, run_many
 
 

@@ -18,8 +18,6 @@ from osimlite.schema.registry import class_for
 from osimlite.simulation.elements.kind import kind_of_class
 from tests.simulation.elements.muscle_rows import CONFIGURATIONS, FOLDER, hung, muscle
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 MUSCLES = {
     "hanging_thelen": "thelen_default",
     "hanging_millard": "millard_damped",

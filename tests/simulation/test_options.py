@@ -12,8 +12,6 @@ from osimlite.simulation import Options, Simulation
 from osimlite.simulation.options import PER_RUN
 from tests.simulation.damped import damped
 
-pytest.importorskip("numba", reason="needs numba (extra 'fast')")
-
 
 def test_what_does_not_exist_is_named():
     for ask in (osimlite.simulate, Simulation):

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from osimlite import read
-from osimlite.simulation.engines.linking import AT_HAND, COMPILED, PYTHON, has_compiler
+from osimlite.simulation.engines.linking import AT_HAND, COMPILED, PYTHON
+from osimlite.simulation.engines.machine_code import has_machine_code
 from osimlite.simulation.paths import Paths
 
 CODES = [
     PYTHON,
     AT_HAND,
-    pytest.param(COMPILED, marks=pytest.mark.skipif(not has_compiler(), reason="numba is not installed")),
+    pytest.param(COMPILED, marks=pytest.mark.skipif(not has_machine_code(), reason="there is no machine code")),
 ]
 
 

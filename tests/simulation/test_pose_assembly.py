@@ -23,8 +23,6 @@ from osimlite.simulation.pose_assembly import assemble_motion
 from tests.multibody.strategies import KINDS, Case, cases, constraint_of
 from tests.simulation.checked import Checked
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 
 def change_of(mechanism: Mechanism, poses: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """Return the squared change that counts of each pose."""

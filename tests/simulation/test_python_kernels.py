@@ -14,8 +14,6 @@ from tests.simulation.checked import Checked, bounded
 from tests.simulation.force_cases import FORCES, with_force
 from tests.simulation.test_compiled_forces import states
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 FILES = ("walker/DynamicWalkerModel.osim", "walkers/steady-walker.osim", "kinematics/mixed_joint_tree.osim")
 
 

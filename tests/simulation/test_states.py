@@ -17,7 +17,6 @@ from tests.oracle.random_models import RandomModel
 from tests.simulation.damped import damped
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 numbers = st.lists(st.floats(-2.0, 2.0), max_size=20)
 

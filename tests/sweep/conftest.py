@@ -9,7 +9,6 @@ import pytest
 import osimlite
 from osimlite.schema.model import Model
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytest.importorskip("pyarrow", reason="needs pyarrow (extra 'sweep')")
 pytest.importorskip("scipy", reason="needs scipy (extra 'sweep')")
 

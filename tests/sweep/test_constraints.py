@@ -11,7 +11,6 @@ from osimlite.simulation import simulate
 from osimlite.sweep.plan import plan
 from osimlite.sweep.runner import Runner
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
 from tests.simulation.test_constrained import four_bars

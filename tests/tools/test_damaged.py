@@ -15,8 +15,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 import osimlite
 from osimlite.errors import OsimliteError
 from tests.fitting.test_inverse_kinematics import free_body

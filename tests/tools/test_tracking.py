@@ -7,8 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.simulation.files.storage import write_sto

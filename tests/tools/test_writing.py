@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.tools.many import JOURNAL

@@ -113,7 +113,6 @@ def test_the_server_answers_the_page_and_nobody_else():
 
 
 def test_forces_of_a_file_of_states_are_those_of_the_simulation(tmp_path: Path):
-    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     model = dynamic_walker()
     trajectory = osimlite.simulate(model, to=0.3, report_interval=0.02)
     trajectory.write(tmp_path)

@@ -160,7 +160,6 @@ def test_energy_is_that_of_the_mechanism():
 
 
 def test_energy_of_a_simulation_has_what_contacts_store():
-    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     trajectory = simulate(dynamic_walker(), 0.1)
     (panel,) = dict(_figures(trajectory, trajectory.mechanism))["energy.png"].axes
     result = lines(panel)

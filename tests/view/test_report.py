@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 pytest.importorskip("matplotlib", reason="needs matplotlib (extra 'plot')")
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
 
 import osimlite
 from osimlite.errors import OsimliteError

@@ -1,4 +1,4 @@
-"""Numbers that carry their derivatives along several directions, as Python has them without numba, and their rules.
+"""Numbers that carry their derivatives along several directions, as Python has them, and their rules.
 
 A kernel runs on such numbers from the text that it has, with functions of them in the place of Python's mathematics.
 What takes no derivatives from one (a comparison, an integer, a vector of floats) takes its value.
@@ -72,6 +72,38 @@ class Carrying:
 
     def __bool__(self) -> bool:
         return self.value != 0.0
+
+
+class DualVector:
+    """A vector of such numbers, which are made of the rows of an array where they are read.
+
+    Args:
+        rows: (n, 1 + directions), each a number and its derivatives.
+    """
+
+    __slots__ = ("_rows",)
+
+    def __init__(self, rows: Any) -> None:
+        self._rows = rows
+
+    @property
+    def values(self) -> Any:
+        """The numbers alone, as a view (n,)."""
+        return self._rows[:, 0]
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, index: Any) -> Any:
+        row = self._rows[index]
+        return DualVector(row) if isinstance(index, slice) else Carrying(float(row[0]), row[1:].tolist())
+
+    def __setitem__(self, index: int, number: Any) -> None:
+        row = self._rows[index]
+        if isinstance(number, Carrying):
+            row[0], row[1:] = number.value, number.slopes
+        else:
+            row[0], row[1:] = number, 0.0
 
 
 def _through(function: Any, slopes: tuple[Callable[..., float], ...]) -> Callable[..., Any]:

@@ -1,4 +1,4 @@
-"""From a packed model to something that runs: machine code where numba is installed, else the kernels as Python."""
+"""From a packed model to something that runs: machine code where there is some, else the kernels as Python."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache
-from importlib.util import find_spec
 from inspect import signature
 from typing import Any
 
 import numpy as np
 
+from osimlite.codegen.toolchain import CompilationError
 from osimlite.kernels import pointers
 from osimlite.kernels.layout import MODEL, OUTCOME
 from osimlite.kernels.pointers import Ints
 from osimlite.kernels.table import LAW_NUMBERS
 from osimlite.simulation.elements.laws import ALONG, RESPONSE, law_function
-from osimlite.simulation.engines.carrying import carried_by
+from osimlite.simulation.engines import machine_code
+from osimlite.simulation.engines.carrying import DualVector, carried_by
 from osimlite.simulation.interrupts import defer_sigint
 from osimlite.simulation.pack import Packed
 
@@ -28,24 +29,9 @@ KERNEL = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 5, ctypes.c_int64
 """A kernel: takes the three vectors, a state, room for its derivative, and the place of an item."""
 
 
-@cache
-def has_compiler() -> bool:
-    """Whether kernels are compiled; numba is not loaded to find out."""
-    try:
-        return find_spec("numba") is not None and find_spec("llvmlite") is not None
-    except ValueError:
-        return False
-
-
 def version() -> str:
-    """Of what runs the kernels."""
-    if has_compiler():
-        from osimlite.simulation.engines.object_code import numba_version
-
-        return f"numba {numba_version()}"
-    import platform
-
-    return f"Python {platform.python_version()}, without numba"
+    """Return what runs the kernels, for summaries."""
+    return machine_code.describe_source()
 
 
 class Code(ABC):
@@ -58,8 +44,13 @@ class Code(ABC):
     def __init__(self, name: str) -> None:
         self.name = name
 
-    def chosen_for(self, functions: Sequence[str]) -> Code:
-        """What runs functions of the kernels: this, unless it leaves that to others."""
+    def chosen_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
+        """Return what runs functions of the kernels: this, unless it leaves that to others.
+
+        Args:
+            functions: names of the functions.
+            later: of those that may be asked for afterwards.
+        """
         return self
 
     @abstractmethod
@@ -89,15 +80,26 @@ class Code(ABC):
 
 
 class _Compiled(Code):
-    def make_ready(self, functions: Sequence[str]) -> None:
-        from osimlite.simulation.engines.machine_code import make_ready
+    def chosen_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
+        if not machine_code.can_prepare((*functions, *later)):
+            warn_of_python()
+            return self._in_python()
+        try:
+            self.make_ready(functions)
+        except CompilationError as error:
+            warn_of_python(str(error))
+            return self._in_python()
+        return self
 
-        make_ready(functions)
+    def _in_python(self) -> Code:
+        """Return what runs the kernels where they cannot be compiled."""
+        return PYTHON
+
+    def make_ready(self, functions: Sequence[str]) -> None:
+        machine_code.make_ready(functions)
 
     def address(self, function: str) -> int:
-        from osimlite.simulation.engines.machine_code import address_of
-
-        return address_of(function)
+        return machine_code.address_of(function)
 
     @cache  # noqa: B019 - there is one object
     def entry(self, function: str) -> Callable[..., int]:
@@ -141,6 +143,21 @@ class Tangents(_Compiled):
         super().__init__(f"machine code along {directions} directions")
         self._width, self._suffix = 1 + directions, f"{ALONG}{directions}"
 
+    def chosen_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
+        """Return this, or Python where the functions cannot be compiled."""
+        if not machine_code.can_prepare([name + self._suffix for name in (*functions, *later)]):
+            warn_of_python()
+            return self._in_python()
+        try:
+            self.make_ready(functions)
+        except CompilationError as error:
+            warn_of_python(str(error))
+            return self._in_python()
+        return self
+
+    def _in_python(self) -> Code:
+        return PythonTangents(self._width - 1)
+
     def make_ready(self, functions: Sequence[str]) -> None:
         """Compile functions of the kernels together."""
         super().make_ready([name + self._suffix for name in functions])
@@ -156,16 +173,11 @@ class Tangents(_Compiled):
 
 
 class AtHand(_Compiled):
-    """Machine code if all of it is in files, else Python."""
+    """Machine code if all of it is in the library or in files, else Python."""
 
-    def chosen_for(self, functions: Sequence[str]) -> Code:
-        """Whichever it is."""
-        if has_compiler():
-            from osimlite.simulation.engines.machine_code import is_at_hand
-
-            if all(map(is_at_hand, functions)):
-                return COMPILED
-        return PYTHON
+    def chosen_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
+        """Return the one or the other."""
+        return COMPILED if all(map(machine_code.is_at_hand, functions)) else PYTHON
 
 
 class _Python(Code):
@@ -188,22 +200,63 @@ class _Python(Code):
         return pointers.address(python), None
 
 
+class PythonTangents(_Python):
+    """Kernels as Python whose numbers carry derivatives; the arrays are those of :class:`Tangents`.
+
+    Args:
+        directions: number of directions.
+    """
+
+    def __init__(self, directions: int) -> None:
+        super().__init__(f"Python along {directions} directions")
+
+    def address(self, function: str) -> int:
+        """Return what stands for the address of a function of the kernels."""
+        return pointers.address(carried_by(law_function(function)))
+
+    def entry(self, function: str) -> Callable[..., int]:
+        """Return a function of the kernels, called with contiguous arrays and integers."""
+        kernel = carried_by(law_function(function))
+        return lambda *parts: kernel(*map(_to_duals, parts))
+
+    def bound(self, function: str, *arrays: Any) -> Callable[[int], int]:
+        """Return a function of the kernels with its arrays, called with one integer."""
+        kernel, vectors = carried_by(law_function(function)), [_to_duals(item) for item in arrays]
+        return lambda number: kernel(*vectors, number)
+
+    def callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
+        """Return what stands for the address of a kernel in Python, which is given the numbers alone."""
+
+        def called(*parts: Any) -> int:
+            return python(*(part.values if isinstance(part, DualVector) else part for part in parts))
+
+        return pointers.address(called), None
+
+
+def _to_duals(part: Any) -> Any:
+    """Return an array of floats and their derivatives as a vector of numbers; anything else as it is."""
+    is_rows = isinstance(part, np.ndarray) and part.dtype == np.float64
+    return DualVector(part) if is_rows else part
+
+
 COMPILED, PYTHON = _Compiled("machine code"), _Python("Python")
 AT_HAND = AtHand("machine code that is in files, or Python")
-"""For those who evaluate so little that Python is sooner done than the compiler."""
+"""For those who evaluate so little that Python is sooner done than a compiler."""
 
 
 def best() -> Code:
-    """Machine code where numba is installed, else Python."""
-    if has_compiler():
+    """Return machine code where there is any, else Python."""
+    if machine_code.has_machine_code():
         return COMPILED
-    _warn()
+    warn_of_python()
     return PYTHON
 
 
 @cache
-def _warn() -> None:
-    _log.warning("numba is not installed: forces are computed in Python, some thousand times slower; pip install numba")
+def warn_of_python(reason: str = "") -> None:
+    """Warn that kernels run as Python, once for each reason."""
+    if machine_code.allows(machine_code.LIBRARY) or reason:
+        _log.warning("%s (%s)", machine_code.PYTHON_COST, reason or "; ".join(machine_code.explain_source()))
 
 
 class Program:
@@ -225,9 +278,10 @@ class Program:
         # Searches side by side know nothing of derivatives.
         runs = {} if isinstance(code, Tangents) else packed.runs
         functions = tuple(dict.fromkeys((*entries, *packed.laws, *kernels, *runs.values())))
-        self.code = code = code.chosen_for(functions)
-        runs = runs if code is COMPILED else {}
         self._equilibria, self._responses = packed.equilibria, packed.responses
+        later = *packed.equilibria.values(), *packed.responses.values()
+        self.code = code = code.chosen_for(functions, () if isinstance(code, Tangents) else later)
+        runs = runs if code is COMPILED else {}
         self.failures: list[Exception] = []
         self._kept: list[Any] = []
         code.make_ready(functions)

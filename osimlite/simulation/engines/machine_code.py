@@ -1,97 +1,170 @@
-"""The entries of the compiled engine: machine code for the evaluation, the motion, and every law.
+"""Addresses of the machine code of laws, wherever it comes from.
 
-Each entry stands for itself and calls the others by their address: so what a model does not need is not compiled, and
-nothing is compiled twice. The compiler is loaded for what is in no file yet.
+A law comes from the library that was compiled at installation. An edited law, or one of a user's own type of force, is
+compiled alone by the C++ compiler of the machine, else by numba. The environment variable OSIMLITE_KERNELS names the
+only source to use: library, compiler, numba or python.
 """
 
 from __future__ import annotations
 
-import hashlib
-import logging
-from collections.abc import Sequence
-from contextlib import ExitStack
-from functools import cache
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+import os
+import platform
+from collections.abc import Iterable, Sequence
 
-from osimlite.codegen.sources import compute_digest
+from osimlite.codegen.toolchain import CompilationError, find_compiler
+from osimlite.errors import OsimliteError
 from osimlite.simulation.elements.laws import law_of
+from osimlite.simulation.engines import kernel_library
+from osimlite.text import or_known
 
-if TYPE_CHECKING:
-    from osimlite.simulation.engines.side_by_side import Made
+VARIABLE = "OSIMLITE_KERNELS"
+"""Environment variable that names the only source of machine code."""
 
-
-_log = logging.getLogger(__name__)
+LIBRARY, COMPILER, NUMBA, PYTHON = SOURCES = "library", "compiler", "numba", "python"
+"""Sources of machine code, in the order in which they are asked; "python" is none."""
 
 _addresses: dict[str, int] = {}
-"""Addresses of the machine code of the laws that are ready, by their names."""
+"""Addresses of the laws that are ready, by name."""
 
 
-SETTINGS = ("carrying.py", "compiler.py", "object_code.py", "tangents.py")
-"""The modules that set the compiler."""
+def allows(source: str) -> bool:
+    """Return whether a source of machine code may be used.
 
-
-def digest_of(function: Any) -> str:
-    """Return the digest of a function and of the modules that set the compiler."""
-    return compute_digest(function, read_settings())
-
-
-@cache
-def read_settings() -> str:
-    """Return a digest of the modules that set the compiler."""
-    here = Path(__file__)
-    return hashlib.sha256(b"\0".join((here.with_name(name)).read_bytes() for name in SETTINGS)).hexdigest()
+    Raises:
+        OsimliteError: the environment variable names no source.
+    """
+    only = os.environ.get(VARIABLE, "")
+    if only and only not in SOURCES:
+        raise OsimliteError(f"{VARIABLE} is '{only}', which is no source of kernels{or_known(only, SOURCES)}")
+    return only in ("", source)
 
 
 def address_of(name: str) -> int:
-    """Address of the code of a law, which is compiled if there is no file of it."""
+    """Return the address of a law, which is compiled if need be.
+
+    Raises:
+        CompilationError: it cannot be compiled here.
+    """
     make_ready([name])
     return _addresses[name]
 
 
-def make_ready(names: Sequence[str]) -> None:
-    """Load the code of laws, and compile what is in no file, side by side if there is much."""
-    missing = [name for name in names if not is_at_hand(name)]
-    if not missing:
-        return
-    from osimlite.simulation.engines.side_by_side import Helper, compilers, made, shares, size_of
-
-    whole, done = sum(map(size_of, missing)), 0
-
-    def keep(law: Made) -> None:
-        nonlocal done
-        _keep(law)
-        done += size_of(law.name)
-        _log.info("compiled '%s'", law.name, extra={"part": done / whole})
-
-    for name in missing:
-        _log.info("compiling '%s'", name, extra={"part": 0.0})
-    own, *others = shares(missing, compilers())
-    with ExitStack() as stack:
-        helpers = [stack.enter_context(Helper(share)) for share in others]
-        for name in own:
-            keep(made(name))
-        for helper in helpers:
-            for result in helper.found():
-                keep(result)
-    for name in missing:
-        if name not in _addresses:
-            keep(made(name))
-
-
 def is_at_hand(name: str) -> bool:
-    """Whether the code of a law is loaded, or in a file, from which it is loaded then."""
+    """Return whether a law is ready, in the library, or in a file; it is loaded then."""
     if name in _addresses:
         return True
-    from osimlite.simulation.engines.object_code import load
+    address = None
+    if allows(LIBRARY) and (library := kernel_library.load_library()) is not None:
+        address = library.address(name)
+    if address is None and allows(COMPILER):
+        from osimlite.simulation.engines import compiled_laws
 
-    result = load(name, digest_of(law_of(name)[0]))
-    if result is not None:
-        _addresses[name] = result
-    return result is not None
+        address = compiled_laws.load_law(name)
+    if address is not None:
+        _addresses[name] = address
+    return address is not None
 
 
-def _keep(law: Made) -> None:
-    from osimlite.simulation.engines.object_code import keep
+def make_ready(names: Sequence[str]) -> None:
+    """Load laws, and compile those that are nowhere yet.
 
-    _addresses[law.name] = keep(law.name, law.digest, law.code, law.symbol)
+    Raises:
+        CompilationError: one cannot be compiled here.
+    """
+    missing = [name for name in dict.fromkeys(names) if not is_at_hand(name)]
+    if not missing:
+        return
+    reason: CompilationError | None = None
+    if allows(COMPILER) and find_compiler() is not None:
+        from osimlite.simulation.engines import compiled_laws
+
+        try:
+            _addresses.update(compiled_laws.compile_laws(missing))
+            return
+        except CompilationError as error:
+            reason = error
+    if allows(NUMBA) and _has_numba():
+        from osimlite.simulation.engines import numba_laws
+
+        for name in missing:
+            _addresses[name] = numba_laws.compile_law(name)
+        return
+    message = f"'{missing[0]}' is in no library, and there is neither a C++ compiler nor numba to compile it"
+    raise reason or CompilationError(message)
+
+
+def can_prepare(names: Iterable[str]) -> bool:
+    """Return whether all laws are at hand, or there is something to compile them with."""
+    if allows(COMPILER) and find_compiler() is not None:
+        return True
+    missing = [name for name in names if not is_at_hand(name)]
+    if not missing:
+        return True
+    has_duals = any(law_of(name)[1] for name in missing)
+    return not has_duals and allows(NUMBA) and _has_numba()
+
+
+def has_machine_code() -> bool:
+    """Return whether laws run as machine code here, unless one is edited."""
+    has_library = allows(LIBRARY) and kernel_library.load_library() is not None
+    return has_library or can_compile()
+
+
+def can_compile() -> bool:
+    """Return whether there is a C++ compiler or numba."""
+    has_compiler = allows(COMPILER) and find_compiler() is not None
+    return has_compiler or (allows(NUMBA) and _has_numba())
+
+
+def _has_numba() -> bool:
+    from osimlite.simulation.engines.numba_laws import has_numba
+
+    return has_numba()
+
+
+def describe_source() -> str:
+    """Return what runs the kernels in a few words, for summaries."""
+    library = kernel_library.load_library() if allows(LIBRARY) else None
+    if library is not None:
+        return f"compiled library ({library.table['target']})"
+    if allows(COMPILER) and find_compiler() is not None:
+        return "C++ compiler"
+    if allows(NUMBA) and _has_numba():
+        return "numba"
+    return f"Python {platform.python_version()}"
+
+
+def explain_source() -> list[str]:
+    """Return sentences that say what runs the kernels, and why."""
+    sentences = []
+    library = kernel_library.load_library() if allows(LIBRARY) else None
+    compiler = find_compiler() if allows(COMPILER) else None
+    if os.environ.get(VARIABLE):
+        sentences.append(f"{VARIABLE}={os.environ[VARIABLE]} names the only source of machine code")
+    if library is not None:
+        sentences.append(
+            f"kernels run from the compiled library {library.path} (target {library.table['target']}, "
+            f"made by {library.table['compiler']})"
+        )
+        if library.changed_files:
+            count = len(library.changed_files)
+            sentences.append(
+                f"{count} of its source files have changed since: edited kernels are compiled one by one; "
+                "pip install -e . compiles the library anew"
+            )
+    elif allows(LIBRARY):
+        sentences.append(kernel_library.explain_absence())
+    alone = "kernels that it lacks are" if library is not None else "each kernel is"
+    if compiler is not None:
+        sentences.append(f"{alone} compiled at first use by {compiler.name}")
+    elif allows(NUMBA) and _has_numba():
+        sentences.append(f"no C++ compiler was found: {alone} compiled at first use by numba, without derivatives")
+    elif library is None:
+        sentences.append(f"no C++ compiler was found, numba is not installed: {PYTHON_COST}")
+    else:
+        sentences.append(f"no C++ compiler was found, numba is not installed: with an edited kernel {PYTHON_COST}")
+    return sentences
+
+
+PYTHON_COST = "the kernels run as Python, some thousand times slower"
+"""What it costs to have no machine code."""

@@ -206,7 +206,6 @@ def test_an_equilibrium_beyond_all_numbers_is_none(code, words):
 
 def test_activation_times_of_the_first_muscle_count_for_all():
     """Of those of De Groote, as in a process of OpenSim; also where nothing but they changes."""
-    pytest.importorskip("numba", reason="needs numba (extra 'sim')")
     from osimlite.simulation.engines.compiled import CompiledEngine
 
     first, other = muscle("dgf_default", activation_time_constant=0.03), muscle("dgf_default")

@@ -23,8 +23,6 @@ from tests.simulation.checked import Checked
 from tests.simulation.elements.muscle_rows import CONFIGURATIONS, hung, muscle
 from tests.simulation.force_cases import FORCES, with_force
 
-pytest.importorskip("numba", reason="needs numba (extra 'sim')")
-
 STATES = 2
 
 

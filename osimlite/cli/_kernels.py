@@ -1,0 +1,14 @@
+"""What runs the kernels here, in sentences for people."""
+
+from __future__ import annotations
+
+
+def explain_kernels() -> list[str]:
+    """Return sentences that say what runs the kernels, and why: a compiled library, a compiler, numba or Python."""
+    from osimlite.errors import MissingDependency
+
+    try:
+        from osimlite.simulation.engines.machine_code import explain_source
+    except MissingDependency as error:
+        return [f"kernels do not run: {error.message}"]
+    return explain_source()

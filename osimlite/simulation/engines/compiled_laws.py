@@ -1,0 +1,189 @@
+"""Laws that a C++ compiler compiles one by one: edited ones, and those of a user's own types of forces.
+
+Each becomes a small shared library, which is kept in a folder that only the user can write in. Its name has the digest
+of the law's sources. A checksum tells damage; who wrote a file is told by who can write there.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import logging
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from osimlite._cores import cores
+from osimlite.codegen import cplusplus, reader
+from osimlite.codegen.processor import machine_name, processor_features
+from osimlite.codegen.reader import TranslationError
+from osimlite.codegen.sources import compute_digest
+from osimlite.codegen.toolchain import NATIVE, CompilationError, find_compiler, library_suffix
+from osimlite.errors import OsimliteError
+from osimlite.simulation.elements.laws import law_of, symbol_of
+from osimlite.simulation.engines.private_files import read_private, write_private
+
+_log = logging.getLogger(__name__)
+
+FOLDER = "NUMBA_CACHE_DIR"
+"""Environment variable that may name the only folder for the files; numba uses it for its own."""
+
+_libraries: list[ctypes.CDLL] = []
+"""Machine code stays where it is as long as these do."""
+
+
+Function = Callable[..., Any]
+
+
+def load_function(symbol: str, function: Function, directions: int) -> int | None:
+    """Return the address of a function that was compiled before; None if there is no file that only the user can write.
+
+    Args:
+        symbol: its name in the library.
+        function: that it was compiled from.
+        directions: number of derivatives that its numbers carry; 0 for floats.
+    """
+    file = _file_name(symbol, function, directions)
+    for folder in cache_folders():
+        code, checksum = read_private(folder / file), read_private(folder / f"{file}.sha256")
+        if code is not None and checksum is not None and hashlib.sha256(code).hexdigest().encode() == checksum:
+            try:
+                return _load(folder / file, symbol)
+            except (OSError, AttributeError):
+                continue
+    return None
+
+
+def load_law(name: str) -> int | None:
+    """Return the address of a law that was compiled before; None if there is no file that only the user can write."""
+    return load_function(symbol_of(name), *law_of(name))
+
+
+def compile_laws(names: Sequence[str]) -> dict[str, int]:
+    """Compile laws, on as many cores as there are.
+
+    Args:
+        names: of the laws.
+
+    Returns:
+        The address of each.
+
+    Raises:
+        CompilationError: there is no compiler, it failed, or a law cannot be translated.
+    """
+    find_compiler()
+    _log.info("compiling %d kernels", len(names))
+    with ThreadPoolExecutor(max(1, min(cores(), len(names)))) as pool:
+        addresses = pool.map(lambda name: compile_function(symbol_of(name), *law_of(name)), names)
+        return dict(zip(names, addresses, strict=True))
+
+
+def compile_function(symbol: str, function: Function, directions: int) -> int:
+    """Compile a function, keep it if there is a folder for that, and return its address.
+
+    Args:
+        symbol: its name in the library.
+        function: in the restricted Python of kernels.
+        directions: number of derivatives that its numbers carry; 0 for floats.
+
+    Raises:
+        CompilationError: there is no compiler, it failed, or the function cannot be translated.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        raise CompilationError("no C++ compiler is installed")
+    try:
+        text = cplusplus.write_library({symbol: (function, directions)})
+    except (TranslationError, OSError) as error:
+        # An OSError is Python's word for a function without a text.
+        raise CompilationError(f"'{symbol}' cannot be compiled: {error}") from error
+    with tempfile.TemporaryDirectory() as work:
+        folder = Path(work)
+        (folder / cplusplus.HEADER).write_text(cplusplus.header_text(), encoding="utf-8")
+        (folder / "law.cpp").write_text(text, encoding="utf-8")
+        result = folder / _file_name(symbol, function, directions)
+        compiler.compile(folder / "law.cpp", folder / "law.o", NATIVE)
+        compiler.link([folder / "law.o"], result)
+        kept = _keep(result)
+        if kept is not None:
+            return _load(kept, symbol)
+        # A loaded file can be removed, but not where the system is Windows.
+        if os.name != "nt":
+            return _load(result, symbol)
+        lasting = Path(tempfile.mkdtemp()) / result.name
+        result.rename(lasting)
+        return _load(lasting, symbol)
+
+
+def _keep(library: Path) -> Path | None:
+    """Copy a library into the first folder that can be written by the user alone, and return its path there."""
+    code = library.read_bytes()
+    refusals = []
+    for folder in cache_folders():
+        path = folder / library.name
+        try:
+            checksum = hashlib.sha256(code).hexdigest().encode()
+            write_private(path, code)
+            write_private(path.with_name(f"{path.name}.sha256"), checksum)
+            return path
+        except OsimliteError as error:
+            refusals.append(str(error))
+    _warn_once(f"machine code is compiled anew in every run, since it can be kept nowhere: {'; '.join(refusals)}")
+    return None
+
+
+@cache
+def _warn_once(sentence: str) -> None:
+    _log.warning(sentence)
+
+
+def _load(path: Path, symbol: str) -> int:
+    """Load a library, and return the address of the function in it."""
+    library = ctypes.CDLL(os.path.realpath(path))
+    address = ctypes.cast(library[symbol], ctypes.c_void_p).value
+    _libraries.append(library)
+    assert address is not None
+    return address
+
+
+def _file_name(symbol: str, function: Function, directions: int) -> str:
+    """Return the name of the file of a function: it holds for one state of its sources and one kind of processor."""
+    parts = compute_digest(function, _translation()), directions, _machine()
+    return f"{symbol}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}{library_suffix()}"
+
+
+@cache
+def _translation() -> str:
+    """Return a digest of what translates laws to C++."""
+    folder = Path(cplusplus.__file__).parent
+    files = sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".h"))
+    files.append(Path(reader.__file__))
+    return hashlib.sha256(b"\0".join(path.read_bytes() for path in files)).hexdigest()
+
+
+@cache
+def _machine() -> tuple[str, ...]:
+    """Return what the machine code is good for."""
+    return sys.platform, machine_name(), *sorted(processor_features())
+
+
+def cache_folders() -> Iterator[Path]:
+    """Yield the folders where files may be, the best one first."""
+    if os.environ.get(FOLDER):
+        yield Path(os.environ[FOLDER])
+        return
+    yield Path(__file__).parents[2] / "kernels" / "__pycache__"
+    home: str | Path | None = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
+    # A relative path would lead into whatever folder the program is started in.
+    if not home or not os.path.isabs(home):
+        try:
+            home = Path.home() / ".cache"
+        except RuntimeError:
+            # The system knows no home of this user, as in some containers.
+            return
+    yield Path(home) / "osimlite"

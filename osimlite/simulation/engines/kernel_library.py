@@ -1,0 +1,114 @@
+"""The library of kernels that was compiled when osimlite was installed.
+
+A wheel has one library for each level of processors, an editable installation one for the processor that compiled it.
+Each carries a table: the digest of every kernel, and the files that these were computed from.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+from zlib import crc32
+
+from osimlite.codegen.processor import processor_features, supports_v3
+from osimlite.codegen.sources import compute_digest
+from osimlite.codegen.toolchain import BASELINE, NATIVE, X86_64_V3, library_suffix
+from osimlite.simulation.elements.laws import law_of, symbol_of
+
+PACKAGE = Path(__file__).parents[2]
+FOLDER = PACKAGE / "native"
+"""Where the build puts the libraries."""
+
+TABLE = "osimlite_kernel_table"
+"""Symbol of the table."""
+
+
+class KernelLibrary:
+    """A loaded library of kernels.
+
+    Args:
+        path: of the shared library.
+
+    Attributes:
+        path: as given.
+        table: its contents: "version", "target", "compiler", "sources" and "laws", and of a native one "features"
+            and "times".
+
+    Raises:
+        OSError: it cannot be loaded.
+        ValueError: it has no table.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._library = ctypes.CDLL(str(path))
+        address = ctypes.addressof(ctypes.c_char.in_dll(self._library, TABLE))
+        self.table: dict[str, Any] = json.loads(ctypes.string_at(address))
+
+    def address(self, name: str) -> int | None:
+        """Return the address of a law; None if the library has none for the present sources."""
+        digest = self.table["laws"].get(name)
+        if digest is None or not self._is_current(name, digest):
+            return None
+        return ctypes.cast(self._library[symbol_of(name)], ctypes.c_void_p).value
+
+    @cached_property
+    def changed_files(self) -> list[str]:
+        """Names of the source files that have changed since the library was compiled."""
+        times = self.table.get("times", {})
+        changed = []
+        for name, (size, checksum) in self.table["sources"].items():
+            path = PACKAGE / name
+            try:
+                info = path.stat()
+                # An installed wheel keeps no times: there the size has to do.
+                if info.st_size == size and info.st_mtime_ns == times.get(name, info.st_mtime_ns):
+                    continue
+                if info.st_size == size and crc32(path.read_bytes()) == checksum:
+                    continue
+            except OSError:
+                pass
+            changed.append(name)
+        return changed
+
+    def _is_current(self, name: str, digest: str) -> bool:
+        """Return whether a law is what it was when the library was compiled."""
+        if not self.changed_files:
+            return True
+        if any(file.startswith("codegen/") for file in self.changed_files):
+            # Another translation of the same law.
+            return False
+        return compute_digest(law_of(name)[0]) == digest
+
+
+@cache
+def load_library() -> KernelLibrary | None:
+    """Load the best library for this processor; None if there is none."""
+    for target in (NATIVE, X86_64_V3, BASELINE):
+        path = FOLDER / f"kernels-{target}{library_suffix()}"
+        if path.exists() and (target != X86_64_V3 or supports_v3()):
+            try:
+                library = KernelLibrary(path)
+            except (OSError, ValueError) as error:
+                _problems.append(f"{path.name} cannot be loaded: {error}")
+                continue
+            if set(library.table.get("features", ())) <= processor_features():
+                return library
+            _problems.append(f"{path.name} was compiled for another processor")
+    return None
+
+
+_problems: list[str] = []
+"""Why libraries that are there are not used."""
+
+
+def explain_absence() -> str:
+    """Return why there is no library."""
+    if load_library() is not None:
+        return ""
+    if _problems:
+        return "; ".join(_problems)
+    return "osimlite was installed without a library of kernels"

@@ -1,0 +1,153 @@
+"""Laws that are compiled alone: kept in private files, not used when damaged or of other sources."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import sys
+
+import pytest
+
+from osimlite.codegen.toolchain import CompilationError, find_compiler
+from osimlite.simulation.engines import compiled_laws
+from osimlite.simulation.engines.compiled_laws import compile_function, load_function
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler is installed")
+
+
+def answer(x: int) -> int:
+    """A function that is sooner compiled than any law."""
+    return 6 * x
+
+
+def other_answer(x: int) -> int:
+    """The same with another body."""
+    return 7 * x
+
+
+def untranslatable(x: int) -> int:
+    """A function with something that the kernels have not."""
+    return len([x])
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The folder of the files, which does not exist yet."""
+    monkeypatch.setattr(compiled_laws, "cache_folders", lambda: [tmp_path / "new" / "folder"])
+    return tmp_path / "new" / "folder"
+
+
+def run(address):
+    return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(address)(8)
+
+
+def test_a_compiled_function_is_found_again(folder):
+    assert load_function("answer", answer, 0) is None
+    assert run(compile_function("answer", answer, 0)) == 48
+    assert run(load_function("answer", answer, 0)) == 48
+    assert all(path.stat().st_mode & 0o077 == 0 for path in (folder, *folder.iterdir()))
+
+
+def test_an_edited_function_is_compiled_anew(folder):
+    compile_function("answer", answer, 0)
+    assert load_function("answer", other_answer, 0) is None
+    assert run(compile_function("answer", other_answer, 0)) == 56
+
+
+def test_another_processor_gets_its_own_files(folder, monkeypatch):
+    compile_function("answer", answer, 0)
+    monkeypatch.setattr(compiled_laws, "_machine", lambda: ("linux", "x86_64", "new_instructions"))
+    assert load_function("answer", answer, 0) is None
+
+
+@pytest.mark.parametrize(
+    "damage", [lambda code: code[:-8], lambda code: b"", lambda code: code[:99] + b"x" + code[100:]]
+)
+def test_a_damaged_file_is_not_loaded(folder, damage):
+    compile_function("answer", answer, 0)
+    library = next(path for path in folder.iterdir() if path.suffix != ".sha256")
+    # The loaded library stays what it is: the damaged one is another file.
+    content = library.read_bytes()
+    library.unlink()
+    library.write_bytes(damage(content))
+    library.chmod(0o600)
+    assert load_function("answer", answer, 0) is None
+    assert run(compile_function("answer", answer, 0)) == 48
+    assert run(load_function("answer", answer, 0)) == 48
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="who may write is not told by bits there")
+@pytest.mark.parametrize("mode", [0o775, 0o757, 0o1777])
+def test_code_that_others_could_have_written_is_neither_loaded_nor_kept(folder, caplog, mode):
+    """Whoever can write there can write a fitting checksum."""
+    compile_function("answer", answer, 0)
+    folder.chmod(mode)
+    assert load_function("answer", answer, 0) is None
+    compiled_laws._warn_once.cache_clear()
+    for path in folder.iterdir():
+        path.unlink()
+    assert run(compile_function("answer", answer, 0)) == 48
+    assert not list(folder.iterdir()) and f"'{folder}' can be written by others" in caplog.text
+
+
+def test_without_a_folder_the_code_lasts_for_the_process(tmp_path, monkeypatch, caplog):
+    blocked = tmp_path / "file"
+    blocked.write_text("no folder")
+    monkeypatch.setattr(compiled_laws, "cache_folders", lambda: [blocked / "inside"])
+    compiled_laws._warn_once.cache_clear()
+    for _ in range(2):
+        assert run(compile_function("answer", answer, 0)) == 48
+    (message,) = caplog.messages
+    assert "compiled anew in every run" in message and str(blocked) in message
+
+
+def test_folders(monkeypatch, tmp_path):
+    """The one that is named, or the package's own and then the user's."""
+    monkeypatch.setenv(compiled_laws.FOLDER, str(tmp_path / "named"))
+    assert list(compiled_laws.cache_folders()) == [tmp_path / "named"]
+    monkeypatch.delenv(compiled_laws.FOLDER)
+    monkeypatch.delenv("LOCALAPPDATA", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    first, last = compiled_laws.cache_folders()
+    assert (first.parent.name, last) == ("kernels", tmp_path / "home" / "osimlite")
+
+
+def test_a_user_without_a_home(monkeypatch):
+    """As in a container that runs under a number of no user."""
+    for name in (compiled_laws.FOLDER, "LOCALAPPDATA", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+
+    def nowhere():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(compiled_laws.Path, "home", nowhere)
+    (only,) = compiled_laws.cache_folders()
+    assert only.parent.name == "kernels"
+
+
+def test_a_function_that_cannot_be_translated_is_named(folder):
+    with pytest.raises(CompilationError, match="'untranslatable' cannot be compiled"):
+        compile_function("untranslatable", untranslatable, 0)
+
+
+def test_without_a_compiler(folder, monkeypatch):
+    monkeypatch.setattr(compiled_laws, "find_compiler", lambda: None)
+    with pytest.raises(CompilationError, match=r"no C\+\+ compiler"):
+        compile_function("answer", answer, 0)
+
+
+def test_a_second_process_compiles_nothing(tmp_path):
+    """The files of one process serve the next, which is given no compiler."""
+    program = (
+        "import sys\n"
+        "from osimlite.simulation.engines import machine_code\n"
+        "machine_code.make_ready(['wrap_sphere'])\n"
+        "print(machine_code.is_at_hand('wrap_sphere'), 'numba' in sys.modules)\n"
+    )
+    kept = {**os.environ, "OSIMLITE_KERNELS": "compiler", compiled_laws.FOLDER: str(tmp_path)}
+    for compiler in ({}, {"CXX": "no-such-compiler"}):
+        done = subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, env={**kept, **compiler}, check=False
+        )
+        assert done.stdout.split() == ["True", "False"], done.stderr

@@ -1,0 +1,103 @@
+"""The library that the build makes: what is in it, and when it is not used."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from osimlite.codegen.toolchain import NATIVE, library_suffix
+from osimlite.simulation.elements.laws import DIRECTIONS, library_laws
+from osimlite.simulation.engines import kernel_library
+from osimlite.simulation.engines.kernel_library import KernelLibrary, load_library
+
+LIBRARY = load_library()
+needs_library = pytest.mark.skipif(LIBRARY is None, reason="osimlite was installed without a library of kernels")
+
+
+@needs_library
+def test_every_law_is_in_the_library():
+    assert {*LIBRARY.table["laws"]} >= {*library_laws(), *library_laws(DIRECTIONS)} or LIBRARY.changed_files
+
+
+@needs_library
+def test_the_library_is_that_of_these_sources():
+    if LIBRARY.changed_files:
+        pytest.skip("the sources have changed since the library was compiled: pip install -e .")
+    assert all(LIBRARY.address(name) for name in LIBRARY.table["laws"])
+    assert LIBRARY.address("no_such_law") is None
+
+
+@pytest.fixture
+def library(tmp_path, monkeypatch):
+    """A library beside a copy of the sources that it was made of."""
+    package = Path(kernel_library.PACKAGE)
+    monkeypatch.setattr(kernel_library, "PACKAGE", tmp_path)
+    made = KernelLibrary(LIBRARY.path)
+    for name in made.table["sources"]:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(package / name, tmp_path / name)
+    return made
+
+
+@needs_library
+def test_touched_files_count_as_unchanged(library, tmp_path):
+    before = library.changed_files
+    del library.changed_files
+    os.utime(tmp_path / "kernels/dynamics.py", (0, 0))
+    assert library.changed_files == before
+
+
+@needs_library
+def test_an_edited_law_is_not_taken_from_the_library(library, tmp_path, monkeypatch):
+    if library.changed_files:
+        pytest.skip("the sources have changed since the library was compiled: pip install -e .")
+    del library.changed_files
+    path = tmp_path / "kernels/dynamics.py"
+    path.write_text(path.read_text("utf-8") + "\n# edited\n", "utf-8")
+    assert library.changed_files == ["kernels/dynamics.py"]
+    # Only a comment: every law is what it was.
+    assert library.address("evaluate") is not None
+    monkeypatch.setattr(kernel_library, "compute_digest", lambda function: "of an edited function")
+    assert library.address("evaluate") is None
+
+
+@needs_library
+def test_another_translator_concerns_all_laws(library, tmp_path):
+    path = tmp_path / "codegen/cplusplus/library.py"
+    path.write_text(path.read_text("utf-8") + "\n# edited\n", "utf-8")
+    assert library.address("evaluate") is None
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty folder of libraries."""
+    monkeypatch.setattr(kernel_library, "FOLDER", tmp_path)
+    monkeypatch.setattr(kernel_library, "_problems", [])
+    load_library.cache_clear()
+    yield tmp_path
+    load_library.cache_clear()
+
+
+def test_without_a_library(folder):
+    assert load_library() is None
+    assert kernel_library.explain_absence() == "osimlite was installed without a library of kernels"
+
+
+def test_a_file_that_is_no_library_is_named(folder):
+    name = f"kernels-{NATIVE}{library_suffix()}"
+    (folder / name).write_bytes(b"no library")
+    assert load_library() is None
+    assert f"{name} cannot be loaded" in kernel_library.explain_absence()
+
+
+@needs_library
+def test_a_library_for_another_processor_is_not_used(folder, monkeypatch):
+    if LIBRARY.table["target"] != NATIVE:
+        pytest.skip("this library runs on any processor of its kind")
+    shutil.copy(LIBRARY.path, folder)
+    monkeypatch.setattr(kernel_library, "processor_features", lambda: frozenset({"sse2"}))
+    assert load_library() is None
+    assert "compiled for another processor" in kernel_library.explain_absence()
