@@ -85,18 +85,27 @@ def _flowing(text: str) -> str:
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
 
 
-def _built_in(error: OsimliteError) -> str:
-    """What to do if a file that is not there has the name of a built-in model."""
+def _suggest_built_in(error: OsimliteError, command: str) -> str:
+    """Return what to do if a file that is missing has the name of a built-in model, or nearly so."""
     from osimlite.errors import MissingFileError
 
     if not isinstance(error, MissingFileError) or error.file is None or os.path.exists(error.file):
         return ""
     from osimlite.models import BUILT_IN
+    from osimlite.text import nearest
 
     name = error.file.removesuffix(".osim")
-    return (
-        f"; 'osimlite build {name} -o {name}.osim' writes the built-in model of this name" if name in BUILT_IN else ""
-    )
+    if name in BUILT_IN:
+        return f"; 'osimlite build {name} -o {name}.osim' writes the built-in model of this name"
+    if command == "scone":
+        from osimlite.models.walking import SCENARIO
+
+        return f"; did you mean '{SCENARIO}', the built-in scenario?" if nearest(name, [SCENARIO]) else ""
+    # Names of files are often near by chance, such as arm26 and arm.
+    similar = nearest(name, BUILT_IN, cutoff=80.0)
+    if similar is None:
+        return ""
+    return f"; did you mean the built-in model '{similar}'? 'osimlite build {similar} -o {similar}.osim' writes it"
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -130,7 +139,7 @@ def _run(words: list[str]) -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # Matrices of mechanisms are small: the threads of OpenBLAS would only wait, and keep a core busy with that.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    words = [ALIASES.get(words[0], words[0]), *words[1:]] if words else words
+    words = [ALIASES.get(words[0], words[0]), *words[1:]] if words else ["--help"]
     # Only the command that is asked for is loaded; without one, all are, for the help.
     names = words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS
     try:
@@ -151,13 +160,14 @@ def _run(words: list[str]) -> None:
             warnings.simplefilter("ignore", UnitWarning)
             if names != COMMANDS and COMPLETING not in os.environ:
                 command = _loaded(words[0])
+                words = [words[0], *command.complete(words[1:])]
                 given = command.read(words[1:])
                 if given is not None:
                     command(**given)
                     raise SystemExit(0)
             raise SystemExit(app(names)(args=words, prog_name="osimlite", standalone_mode=False))
     except OsimliteError as error:
-        complain(error, _built_in(error))
+        complain(error, _suggest_built_in(error, words[0]))
         raise SystemExit(error.exit_code) from None
     except (Exception, KeyboardInterrupt) as error:
         if _was_interrupted(error):
@@ -196,6 +206,8 @@ def _tell(error: BaseException, words: list[str]) -> NoReturn:
     if not hasattr(error, "format_message"):
         raise error
     context = getattr(error, "ctx", None)
-    path = context.command_path if context is not None else "osimlite"
+    # Errors about an option without a value come without a context.
+    command = " ".join(["osimlite", *(word for word in words[:1] if word in COMMANDS)])
+    path = context.command_path if context is not None else command
     complain(f"{error.format_message().rstrip('.')}; '{path} --help' lists what there is")
     raise SystemExit(2) from None

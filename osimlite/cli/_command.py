@@ -26,17 +26,24 @@ class Declared:
         maker: "Option" or "Argument" of typer.
         names: under which an option is given; else the parameter's own.
         told: the keyword arguments of typer's function.
+        bare_value: the value of an option that stands without one; None if it needs a value.
     """
 
-    __slots__ = "maker", "names", "told"
+    __slots__ = "bare_value", "maker", "names", "told"
 
-    def __init__(self, maker: str, names: Sequence[str], told: dict[str, Any]) -> None:
-        self.maker, self.names, self.told = maker, names, told
+    def __init__(self, maker: str, names: Sequence[str], told: dict[str, Any], bare_value: str | None = None) -> None:
+        self.maker, self.names, self.told, self.bare_value = maker, names, told, bare_value
 
 
-def Option(*names: str, **told: Any) -> Declared:
-    """An option, with what ``typer.Option`` takes."""
-    return Declared("Option", names, told)
+def Option(*names: str, bare_value: str | None = None, **told: Any) -> Declared:
+    """Declare an option, with what ``typer.Option`` takes.
+
+    Args:
+        names: under which it is given; the parameter's own name by default.
+        bare_value: the value if another option, or nothing, follows it; None if it needs a value.
+        told: keyword arguments of ``typer.Option``.
+    """
+    return Declared("Option", names, told, bare_value)
 
 
 def Argument(**told: Any) -> Declared:
@@ -133,6 +140,21 @@ class Command:
                 )
             )
         return Signature(made)
+
+    def complete(self, words: Sequence[str]) -> list[str]:
+        """Return the words of a command line, with a value after each option that may stand without one."""
+        bare_values = {
+            spelling: each.declared.bare_value
+            for each in self.parameters()
+            if each.declared.bare_value is not None
+            for spelling in each.spellings
+        }
+        result: list[str] = []
+        for word, following in zip(words, [*words[1:], "-"], strict=True):
+            result.append(word)
+            if word in bare_values and following.startswith("-"):
+                result.append(bare_values[word])
+        return result
 
     def read(self, words: Sequence[str]) -> dict[str, Any] | None:
         """The values that words give the parameters; None if typer has to read them."""

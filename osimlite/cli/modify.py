@@ -53,6 +53,8 @@ def modify(
         changes.append(change_of(name, value))
     top = read_any(file)
     if isinstance(top, Model):
+        if not changes:
+            raise SettingError("there is nothing to replace; add --replace NAME=WORD, such as muscles=degroote")
         model = read(file)
     else:
         processor = next((part for part in top.walk() if isinstance(part, ModelProcessor)), None)

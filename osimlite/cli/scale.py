@@ -51,6 +51,7 @@ def scale(
     from osimlite.cli._console import say
     from osimlite.document.printer import write
     from osimlite.document.reader import read
+    from osimlite.errors import SettingError
     from osimlite.fitting.scale_tool import scale as scaled
 
     measurements = {
@@ -58,6 +59,8 @@ def scale(
         for body, pairs in options.named_words(distance, "--distance", "BODY=MARKER:MARKER").items()
     }
     factors = {body: _factors(text, body) for body, text in options.named_words(factor, "--factor").items()}
+    if not (measurements or factors or place or mass > 0.0):
+        raise SettingError("there is nothing to scale; add --distance, --factor, --mass or --place")
     result = scaled(
         read(file),
         static,

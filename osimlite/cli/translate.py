@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from osimlite.translate.fidelity import Fidelity
 
 
+WRITTEN = "the file that is written"
+"""Value of --check without a file."""
+
+
 def _choices() -> Iterator[Choice]:
     for exporter in exporters("translate").values():
         yield from exporter.choices
@@ -35,9 +39,11 @@ def translate(
     check: Annotated[
         Path | None,
         Option(
-            metavar="MJCF",
-            help="Translate nothing, but measure this file, by whatever program, against the model (needs MuJoCo).",
+            metavar="[MJCF]",
+            help="Compare an MJCF file of any program with the model, and translate nothing; without a file, translate "
+            "to MJCF and compare that (needs MuJoCo).",
             show_default=False,
+            bare_value=WRITTEN,
         ),
     ] = None,
     **chosen: Any,
@@ -46,19 +52,24 @@ def translate(
 
     Meshes in VTK's format (.vtp) become .obj, text .stl becomes binary.
     fidelity.json says what became of every component, and the table what is lost.
-    --check MJCF prints lengths, moment arms and forces of its muscles beside the
-    model's; with -o it writes them to check.json.
+    --check MJCF prints the errors of lengths, moment arms and forces of its muscles;
+    with -o it writes them to check.json.
 
     Example: osimlite translate gait.osim --geometry ~/OpenSim/Geometry -o robot
     """
     from osimlite.document.reader import read
     from osimlite.errors import OsimliteError, SettingError
 
-    if check is not None:
+    if check is not None and str(check) != WRITTEN:
         from osimlite.cli._checking_mjcf import check as check_mjcf
 
         check_mjcf(file, check, output)
         return
+    if check is not None:
+        from osimlite._require import require
+
+        require("mujoco", extra="mujoco", purpose="--check")
+        to = "mjcf"
     formats = exporters("translate")
     if to not in formats:
         raise OsimliteError(f"--to is {' or '.join(map(repr, formats))}, not '{to}'")
@@ -81,6 +92,10 @@ def translate(
         f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move; wrote "
         + listed([str(path) for path in written], most=4)
     )
+    if check is not None:
+        from osimlite.cli._checking_mjcf import check as check_mjcf
+
+        check_mjcf(file, written[0], options.results_folder(file, output))
 
 
 def _table(fidelity: Fidelity, target: str) -> Any:

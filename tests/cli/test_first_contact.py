@@ -1,0 +1,65 @@
+"""What a newcomer types first, and what the answers lead to."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import osimlite
+from tests.cli.command import run
+
+
+@pytest.fixture
+def box(tmp_path: Path) -> Path:
+    model = osimlite.Model(name="box")
+    body = model.add(osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    model.add(osimlite.PinJoint(name="pin").between(model.ground, body))
+    osimlite.write(model, tmp_path / "box.osim")
+    return tmp_path
+
+
+def test_without_words_the_help_is_printed(tmp_path: Path) -> None:
+    done = run(folder=tmp_path)
+    assert (done.code, done.err) == (0, "") and done.out == run("--help", folder=tmp_path).out
+    assert "simulate" in done.out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("scone", "human-walk"), "did you mean 'human-walks', the built-in scenario?"),
+        (("scone", "humanwalks"), "did you mean 'human-walks', the built-in scenario?"),
+        (("simulate", "dynamic-walkr"), "did you mean the built-in model 'dynamic-walker'?"),
+        (("view", "jumpr.osim"), "'osimlite build jumper -o jumper.osim' writes it"),
+        (("scale", "box.osim"), "there is nothing to scale; add --distance, --factor, --mass or --place"),
+        (("scale", "box.osim", "--preserve-masses"), "there is nothing to scale"),
+        (("modify", "box.osim"), "there is nothing to replace; add --replace NAME=WORD"),
+        (("simulate", "box.osim", "--to"), "'osimlite simulate --help' lists what there is"),
+        (("validate", "--format"), "'osimlite validate --help' lists what there is"),
+        (("translate", "box.osim", "-o"), "'osimlite translate --help' lists what there is"),
+        (("run-tool", "setup.xml", "--workers"), "'osimlite run --help' lists what there is"),
+        (("--nothing",), "'osimlite --help' lists what there is"),
+    ],
+)
+def test_errors_lead_on(box: Path, words: tuple[str, ...], said: str) -> None:
+    done = run(*words, folder=box)
+    assert done.code == 2 and done.out == ""
+    assert said in done.err and done.err.count("\n") == 1
+    assert [path.name for path in box.iterdir()] == ["box.osim"]
+
+
+def test_a_name_that_is_near_by_chance_suggests_nothing(tmp_path: Path) -> None:
+    assert "did you mean" not in run("info", "arm26.osim", folder=tmp_path).err
+
+
+def test_check_without_a_file_compares_what_is_written(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco", reason="needs mujoco (extra 'mujoco')")
+    assert run("build", "jumper", "-o", "jumper.osim", folder=tmp_path).code == 0
+    for words in (("--check", "-o", "out"), ("-o", "out", "--check")):
+        done = run("translate", "jumper.osim", *words, folder=tmp_path)
+        assert (done.code, done.err) == (0, ""), done.err
+        assert "jumper.xml: root mean square errors" in done.out
+        assert json.loads((tmp_path / "out" / "check.json").read_text())["muscles"]
+        assert (tmp_path / "out" / "fidelity.json").exists()
