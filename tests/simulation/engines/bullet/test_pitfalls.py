@@ -80,10 +80,12 @@ def spinning(speed):
 
 
 def test_fast_joints_are_not_clipped(monkeypatch):
-    assert osimlite.simulate(spinning(150.0), to=0.1, fixed_step=0.01).speeds[-1, 0] == pytest.approx(150.0)
+    assert osimlite.simulate(spinning(150.0), to=0.1, fixed_step=0.01, engine="bullet").speeds[-1, 0] == pytest.approx(
+        150.0
+    )
     monkeypatch.setattr(World, "FASTEST", 100.0)
     with pytest.raises(OsimliteError, match="bursts"):
-        osimlite.simulate(spinning(150.0), to=0.1, fixed_step=0.01)
+        osimlite.simulate(spinning(150.0), to=0.1, fixed_step=0.01, engine="bullet")
 
 
 def impossible_inertia():
@@ -169,7 +171,7 @@ def test_no_sub_steps(mechanism):
 
 def test_slow_motion_does_not_fall_asleep(monkeypatch):
     def far():
-        return osimlite.simulate(spinning(0.05), to=5.0, fixed_step=0.01).values[-1, 0]
+        return osimlite.simulate(spinning(0.05), to=5.0, fixed_step=0.01, engine="bullet").values[-1, 0]
 
     assert far() == pytest.approx(0.25)
     monkeypatch.setattr(World, "FLAGS", World.FLAGS | bullet.URDF_ENABLE_SLEEPING)
