@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
 from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Any, NamedTuple, get_args, get_origin
@@ -150,7 +151,7 @@ class Command:
             for spelling in each.spellings
         }
         result: list[str] = []
-        for word, following in zip(words, [*words[1:], "-"], strict=True):
+        for word, following in pairwise([*words, "-"]):
             result.append(word)
             if word in bare_values and following.startswith("-"):
                 result.append(bare_values[word])

@@ -9,6 +9,7 @@ import pytest
 
 import osimlite
 from tests.cli.command import run
+from tests.cli.test_command import loaded
 
 
 @pytest.fixture
@@ -18,6 +19,11 @@ def box(tmp_path: Path) -> Path:
     model.add(osimlite.PinJoint(name="pin").between(model.ground, body))
     osimlite.write(model, tmp_path / "box.osim")
     return tmp_path
+
+
+@pytest.mark.parametrize("command", ["rule", "lsp", "doctor"])
+def test_a_command_alone_is_read(command: str) -> None:
+    assert loaded(command).complete([]) == [] and loaded(command).read([]) is not None
 
 
 def test_without_words_the_help_is_printed(tmp_path: Path) -> None:
