@@ -82,7 +82,7 @@ def round_to_integers(s: Ints, x: Floats, out: Floats, count: int) -> int:
     out[6], out[7] = int(s[0]), floor(s[0])
     out[8], out[9], out[10] = isnan(x[0]), isfinite(x[0]), isinf(x[0])
     out[11], out[12], out[13] = bool(x[1]), bool(s[1]), float(s[0])
-    out[14], out[15], out[16] = abs(a), abs(-s[0]), abs(s[0] > 1)
+    out[14], out[15], out[16] = abs(a) + abs(-5), abs(-s[0]), abs(s[0] > 1)
     out[17] = int(s[0] > 2) + (s[0] > 1) * 10 + True
     out[18] = -(s[0] == 2) + float(s[1] > 0)
     return int(a * 4.0)

@@ -169,7 +169,8 @@ def _infer_magnitude(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
 
 
 def _write_magnitude(codes: Sequence[str], kinds: Types, result: Type) -> str:
-    return f"py::abs({cast_to(codes[0], kinds[0], result)})"
+    # The overload for integers is no better match for a literal than that for floats.
+    return f"py::abs(static_cast<int64_t>({codes[0]}))" if is_integral(kinds[0]) else f"py::abs({codes[0]})"
 
 
 # -------------------------------------------------------------------------------------------------- vectors
