@@ -197,7 +197,7 @@ def _tell(error: BaseException, words: list[str]) -> NoReturn:
     if isinstance(error, ModuleNotFoundError):
         from osimlite.cli.doctor import bringing
 
-        extra = bringing(error.name)
+        extra = bringing(error.name, words[0])
         if extra is None:
             raise error
         complain(f"'{words[0]}' needs {error.name}, which is not installed; run: pip install 'osimlite[{extra}]'")

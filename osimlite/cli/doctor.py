@@ -21,6 +21,7 @@ from osimlite.cli._progress import progress_bar
 
 NEEDS: dict[str, tuple[str, ...]] = {
     "build": (),
+    "build human-walks": ("numpy",),
     "validate": (),
     "format": (),
     "upgrade": (),
@@ -33,6 +34,12 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "scale": ("numpy",),
     "ik": ("numpy",),
     "inverse-dynamics": ("numpy",),
+    "static-optimization": ("numpy",),
+    "fit": ("numpy",),
+    "muscles": ("numpy",),
+    "check-trial": ("numpy",),
+    "scone": ("numpy",),
+    "find-gait": ("numpy",),
     "run": ("numpy",),
     "view": ("numpy",),
     "gait": ("numpy",),
@@ -172,9 +179,11 @@ def purposes(wanted: dict[str, list[str]]) -> dict[str, list[str]]:
     return result
 
 
-def bringing(module: str | None) -> str | None:
-    """The first extra that brings a module; None if none does."""
+def bringing(module: str | None, use: str = "") -> str | None:
+    """Return the first extra that brings a module, and all else that a use of `NEEDS` needs; None if there is none."""
     name = {"PIL": "pillow", "yaml": "pyyaml"}.get(module or "", module)
+    if name in NEEDS.get(use, ()):
+        return next((extra for extra, uses in purposes(requirements()).items() if use in uses), None)
     return next((extra for extra, names in requirements().items() if extra and name in names), None)
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any, get_type_hints
 
 from osimlite._load import errors_placed, imports_beside, module_named, module_of_file
 from osimlite.document.data import SUFFIXES, read_data
-from osimlite.errors import OsimliteError
+from osimlite.errors import MissingDependency, OsimliteError
 from osimlite.models import BUILT_IN, STUDIES
 from osimlite.schema.model import Model
 from osimlite.text import did_you_mean, listed
@@ -53,7 +54,7 @@ def write_beside(source: str, model: Model, file: Path) -> list[Path]:
     if source not in STUDIES:
         return []
     place, _, name = STUDIES[source].partition(":")
-    return getattr(module_named(place), name)(model, file)
+    return getattr(_import_built_in(place, source), name)(model, file)
 
 
 def parameters_of(source: str) -> dict[str, Any]:
@@ -68,8 +69,11 @@ def parameters_of(source: str) -> dict[str, Any]:
 
 
 def describe(name: str) -> str:
-    """One line about a built-in model: its summary and its parameters."""
-    function = _function(BUILT_IN[name])
+    """Return one line about a built-in model: its summary and its parameters, or what it needs to be built."""
+    try:
+        function = _function(name)
+    except MissingDependency as error:
+        return error.message
     summary = (inspect.getdoc(function) or "").split("\n")[0].removeprefix("Build the ").removesuffix(".")
     parameters = ", ".join(f"{p.name}={p.default}" for p in inspect.signature(function).parameters.values())
     return f"{summary} ({parameters})" if parameters else summary
@@ -80,7 +84,9 @@ def _function(source: str) -> Callable[..., Any]:
     place, _, name = target.rpartition(":")
     if not place:
         place, name = target, ""
-    if place.endswith(".py"):
+    if source in BUILT_IN:
+        module = _import_built_in(place, source)
+    elif place.endswith(".py"):
         module = module_of_file(Path(place))
     elif ":" in target:
         module = module_named(place)
@@ -93,6 +99,21 @@ def _function(source: str) -> Callable[..., Any]:
             raise OsimliteError(f"'{place}' has no function '{name}'{did_you_mean(name, _functions(module))}")
         return result
     return _only_function(module, place)
+
+
+def _import_built_in(module: str, source: str) -> ModuleType:
+    """Import the module of a built-in model.
+
+    Raises:
+        MissingDependency: the model needs a package that is not installed.
+    """
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        raise MissingDependency(
+            f"the built-in model '{source}' needs {error.name}, which is not installed; "
+            "run: pip install 'osimlite[sim]'"
+        ) from error
 
 
 def _functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
