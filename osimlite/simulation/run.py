@@ -456,7 +456,7 @@ class Simulation:
             }
 
         report = Report(
-            lambda: asked(lambda engine: (engine.columns, list(map(engine.force_records, times, states)))),
+            lambda: asked(lambda engine: (engine.columns, engine.force_table(times, states))),
             lambda: asked(lambda engine: list(map(engine.energies, times, states))),
             lambda: asked(
                 lambda engine: (

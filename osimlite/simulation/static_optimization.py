@@ -360,8 +360,7 @@ class StaticOptimization:
         owners = [item.path for item in elements for _ in item.columns]
         rows = np.zeros((len(shared.times), len(labels)))
         if not {*owners} <= {*self._paths}:
-            moments = zip(shared.times.tolist(), system.state.rows(values, speeds).tolist(), strict=True)
-            rows[:] = [system.force_records(t, y) for t, y in moments]
+            rows[:] = system.force_table(shared.times, system.state.rows(values, speeds))
         places = {path: k for k, path in enumerate(self._paths)}
         own = [column for column, path in enumerate(owners) if path in places]
         rows[:, own] = shared.forces[:, [places[owners[column]] for column in own]]

@@ -36,6 +36,10 @@ if TYPE_CHECKING:
     from osimlite.simulation.pack_chain import Chain
 
 
+MOMENTS_AT_ONCE = 4096
+"""So many moments are evaluated together."""
+
+
 class System:
     """A mechanism and its forces, laid out for the kernels.
 
@@ -442,6 +446,58 @@ class System:
         self.applied(t, y)
         origins = [self._origin(body) for body in range(len(self.placements))] + [(0.0, 0.0, 0.0)]
         return [value for element, records in self._records() for value in element.report(records, origins)]
+
+    def force_table(self, times: Sequence[float] | Floats, states: Sequence[Sequence[float]] | Floats) -> Floats:
+        """Return one row of the columns for each moment, with all moments evaluated in one call of the kernels.
+
+        Args:
+            times: of the moments (k,), s.
+            states: in the order of the engine (k, y).
+
+        Returns:
+            Numbers (k, c), those of :meth:`force_records`.
+
+        Raises:
+            SimulationError: the rates of coordinates are not defined at a moment, or a force cannot be computed.
+        """
+        moments = np.column_stack([times, np.asarray(states, dtype=float).reshape(len(times), len(self._y))])
+        result = np.zeros((len(moments), len(self.columns)))
+        if not self.columns:
+            return result
+        slices, places = [], list[int]()
+        for items in self._items:
+            own = []
+            for place, room in items:
+                own.append(slice(len(places), len(places) + room))
+                places += range(place, place + room)
+            slices.append(own)
+        links, size = int(self.structure[MODEL.WORK_LINK]), LINK_WORK.SIZE
+        count = len(places)
+        for number in range(len(self._links)):
+            first = links + size * number
+            places += [*range(first, first + 9), *range(first + LINK_WORK.POSITION, first + LINK_WORK.POSITION + 3)]
+        # The work vectors of long motions are large.
+        for start in range(0, len(moments), MOMENTS_AT_ONCE):
+            found = self.looked(moments[start : start + MOMENTS_AT_ONCE], places)
+            origins = self._origins_of(found[:, count:].reshape(len(found), -1, 12)).tolist()
+            for number, (work, known) in enumerate(zip(found[:, :count].tolist(), origins, strict=True), start):
+                rows = (
+                    element.report([work[part] for part in own], known)
+                    for element, own in zip(self.forces.elements, slices, strict=True)
+                )
+                result[number] = [value for row in rows for value in row]
+        return result
+
+    def _origins_of(self, links: Floats) -> Floats:
+        """Return the origins of all bodies and of ground (k, b + 1, 3) by rotations and places of links (k, l, 12)."""
+        result = np.zeros((len(links), len(self.placements) + 1, 3))
+        for body, (link, frame) in enumerate(self.placements):
+            offset = frame[:3, 3]
+            if link == GROUND:
+                result[:, body] = offset
+            else:
+                result[:, body] = links[:, link, 9:] + links[:, link, :9].reshape(-1, 3, 3) @ offset
+        return result
 
     def energies(self, t: float, y: Sequence[float]) -> tuple[float, float, float]:
         """Kinetic energy, potential energy of gravity, energy stored in forces, J."""

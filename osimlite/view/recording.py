@@ -126,10 +126,7 @@ def computed_forces(
     if not forces.elements:
         return {}
     system = System(mechanism, forces)
-    rows = [
-        system.force_records(t, system.state.pack(q, u)) for t, q, u in zip(times.tolist(), values, speeds, strict=True)
-    ]
-    table = np.array(rows, dtype=float).reshape(len(times), len(system.columns))
+    table = system.force_table(times, system.state.rows(values, speeds))
     return {label: table[:, index] for index, label in enumerate(system.columns)}
 
 

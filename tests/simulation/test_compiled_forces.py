@@ -66,6 +66,7 @@ def assert_same(mechanism, ours, theirs, count=8) -> int:
         touched |= ours.loads[-1]
         y, z = ours.state.pack(q, u), theirs.state.pack(q, u)
         assert_close(ours.force_records(t, y), theirs.force_records(t, z))
+        assert ours.force_table([t, t], [y, y]).tolist() == [ours.force_records(t, y)] * 2
         assert ours.energies(t, y) == pytest.approx(theirs.energies(t, z), rel=1e-9, abs=1e-9)
     return touched
 

@@ -88,6 +88,9 @@ class Engine(Protocol):
     def force_records(self, t: float, y: list[float]) -> list[float]:
         """One number for each of the columns. Works when the engine is closed."""
 
+    def force_table(self, times: Sequence[float], states: Sequence[Sequence[float]]) -> Floats:
+        """Return one row of the columns for each moment (k, c). Works when the engine is closed."""
+
     def probe_results(self, t: float, y: Sequence[float]) -> list[list[float]]:
         """What each probe gives at a state, before its operation. Works when the engine is closed."""
 

@@ -153,7 +153,7 @@ def _header(name: str, columns: Sequence[str], rows: int, in_degrees: bool, kind
 def _lines(times: Iterable[float], rows: Iterable[Iterable[float]], size: int) -> Iterator[str]:
     """Lines of numbers, of which `size` make a value."""
     for time, row in zip(times, rows, strict=True):
-        words = list(map(number_text, row))
+        words = [word[:-2] if word.endswith(".0") else word for word in map(repr, map(float, row))]
         if size > 1:
             if len(words) % size:
                 raise OsimliteError(f"a row has {len(words)} numbers, which makes no whole values of {size} each")

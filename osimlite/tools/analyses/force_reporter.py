@@ -40,6 +40,5 @@ def force_records(motion: Motion, system: System) -> Array:
     result = np.full((len(motion.times), len(system.columns)), np.nan)
     owners = [element.path for element in system.forces.elements for _ in element.columns]
     there = [k for k, path in enumerate(owners) if path not in motion.left_out]
-    rows = [motion.system.force_records(t, y) for t, y in motion.moments]
-    result[:, there] = np.array(rows).reshape(len(motion.times), len(there))
+    result[:, there] = motion.system.force_table(motion.times, motion.states)
     return result
