@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import builtins
-import copy
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FunctionType
@@ -13,7 +12,7 @@ from typing import Any
 from osimlite.backends import symbols, ways
 from osimlite.backends.curves import curve_value_on_symbols, damped_velocity_on_symbols, pieces_on_symbols
 from osimlite.backends.symbols import COUNTERPARTS, UNSET, NoFormula, Vector
-from osimlite.codegen.reader import Function, Kernel, name_of, stored
+from osimlite.codegen.reader import Function, Kernel, copy_tree, name_of, stored
 from osimlite.forces.bezier import curve_value
 from osimlite.forces.carried import is_nothing
 from osimlite.forces.millard2012_equilibrium import damped_velocity
@@ -143,7 +142,7 @@ class _Writer(Kernel, ast.NodeTransformer):
 
     def parse(self, function: Function) -> ast.FunctionDef:
         """Return a tree that can be rewritten."""
-        return copy.deepcopy(super().parse(function))
+        return copy_tree(super().parse(function))
 
     def made(self) -> Any:
         """The function."""
@@ -200,7 +199,7 @@ class _Writer(Kernel, ast.NodeTransformer):
         if sign is None:
             self.generic_visit(node)
             return node
-        before: Any = copy.deepcopy(node.target)
+        before: Any = copy_tree(node.target)
         before.ctx = ast.Load()
         return ast.Assign([self.visit(node.target)], _call_of(sign, self.visit(before), self.visit(node.value)))
 

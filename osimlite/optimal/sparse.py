@@ -1,0 +1,60 @@
+"""Constant sparse matrices that are multiplied by vectors.
+
+The few operations that a nonlinear program needs, by NumPy alone: to import `scipy.sparse` takes a fifth of the process
+that solves a small study.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from osimlite.multibody.spatial import Array
+from osimlite.records import dataclass
+
+
+@dataclass(frozen=True, eq=False)
+class SparseMatrix:
+    """A sparse matrix by its entries, each place once, row by row and column by column."""
+
+    rows: NDArray[np.int64]  # of the entries (k,)
+    columns: NDArray[np.int64]  # of the entries (k,)
+    values: Array  # of the entries (k,)
+    shape: tuple[int, int]
+
+    @classmethod
+    def of_entries(cls, rows: ArrayLike, columns: ArrayLike, values: ArrayLike, shape: tuple[int, int]) -> SparseMatrix:
+        """Return the matrix of some entries; those at one place are added.
+
+        Args:
+            rows: of the entries (k,).
+            columns: of the entries (k,).
+            values: of the entries (k,).
+            shape: of the matrix.
+        """
+        width = max(shape[1], 1)
+        keys = np.asarray(rows, dtype=np.int64) * width + np.asarray(columns, dtype=np.int64)
+        places, inverse = np.unique(keys, return_inverse=True)
+        totals = np.bincount(inverse, np.asarray(values, dtype=float), len(places))
+        return cls(places // width, places % width, np.asarray(totals, dtype=np.float64), shape)
+
+    def __matmul__(self, vector: Array) -> Array:
+        """Return the product with a vector."""
+        products = self.values * vector[self.columns]
+        return np.asarray(np.bincount(self.rows, products, self.shape[0]), dtype=np.float64)
+
+    def multiply_transpose(self, vector: Array) -> Array:
+        """Return the product of the transpose with a vector."""
+        products = self.values * vector[self.rows]
+        return np.asarray(np.bincount(self.columns, products, self.shape[1]), dtype=np.float64)
+
+    def select_columns(self, places: NDArray[np.int64]) -> SparseMatrix:
+        """Return the matrix of some of the columns (c,), in their order; one may stand there several times."""
+        order = np.argsort(self.columns, kind="stable")
+        starts = np.searchsorted(self.columns[order], np.arange(self.shape[1] + 1))
+        counts = (starts[1:] - starts[:-1])[places]
+        # The entries of each column follow one another in the order.
+        first = np.repeat(starts[:-1][places] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
+        chosen = order[first + np.arange(counts.sum())]
+        columns = np.repeat(np.arange(len(places)), counts)
+        return SparseMatrix.of_entries(self.rows[chosen], columns, self.values[chosen], (self.shape[0], len(places)))
