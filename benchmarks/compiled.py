@@ -1,9 +1,9 @@
-"""The compiled engine on the Dynamic Walker, two seconds: many walkers beside OpenSim, cold start and cached start.
+"""The compiled engine on the Dynamic Walker, two seconds: many walkers beside OpenSim, and whole processes.
 
 One walker is in simulate.py. A sweep starts from a little beside the default pose, and keeps the ends and the contacts
 of every run; OpenSim runs some of the same starts one by one on one core, in its quickest way: the model built once,
 the state copied, nothing recorded. Both count processor time. Whole process: a new Python that imports, reads the file,
-simulates, and ends; cold with an empty cache of machine code, cached with a full one.
+simulates, and ends.
 """
 
 from __future__ import annotations
@@ -115,9 +115,8 @@ def whole_processes() -> Table:
         table.add_column(heading, justify="right")
     with tempfile.TemporaryDirectory() as folder:
         for name, engine in (
-            ("cold", "compiled"),
-            ("cached", "compiled"),
-            ("cached", "compiled"),
+            ("first", "compiled"),
+            ("second", "compiled"),
             ("PyBullet", "bullet"),
         ):
             command = [sys.executable, "-c", PROCESS.format(model=str(Path(MODEL)), to=TO, engine=engine)]

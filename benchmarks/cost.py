@@ -31,7 +31,7 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 ACCEPTED = HERE / "cost.json"
 TOLERANCE = 0.03
-LIBRARIES = ("lxml", "numba", "numpy", "pydantic", "pydantic_core", "rapidfuzz", "rich", "scipy", "typer")
+LIBRARIES = ("lxml", "numpy", "pydantic", "pydantic_core", "rapidfuzz", "rich", "scipy", "typer")
 KINDS = {
     "calls": ("calls", 20, True),
     "modules": ("modules", 0, True),
@@ -149,15 +149,15 @@ def prepare() -> None:
 
 
 def _counts(folder: Path, package: str, words: list[str]) -> dict[str, Any]:
-    """Count in a new process; again if that was the one that made machine code."""
+    """Count in a new process; again where a first process may have compiled kernels."""
+    from osimlite.simulation.engines.kernel_library import load_library
+
     result = folder / f"{'-'.join(words).replace('/', '') or 'calls'}.json"
     path = os.pathsep.join((str(HERE), Path(package).parent.as_posix(), *map(os.path.abspath, filter(None, sys.path))))
     command = [sys.executable, "-S", str(HERE / "_counted.py"), str(result), path, package, *words]
-    for _ in range(2):
+    for _ in range(2 if load_library() is None else 1):
         _run(command, folder, package)
-        found: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
-        if not any("numba" in count["library modules"] for count in found.values()):
-            break
+    found: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
     return found
 
 

@@ -216,7 +216,7 @@ def first_use(path: Path) -> str:
             float(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
             for _ in range(2)
         ]
-    return f"{seconds[0]:.1f} s compiled, {seconds[1]:.2f} s from the cache"
+    return f"{seconds[0]:.2f} s the first time, {seconds[1]:.2f} s the second"
 
 
 def sweep(path: Path | None, console: Console) -> None:
