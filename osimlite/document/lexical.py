@@ -128,7 +128,8 @@ def converter(kind: Kind) -> Callable[[str], Any]:
     if kind.size is not None:
         return _exactly(kind.size)
     if kind.shape == "vector":
-        return _words(word, 0, None)
+        # OpenSim keeps the default of a vector whose element is empty.
+        return _words(word, 1, None)
     if kind.legacy and kind.scalar != "string":
         return _legacy_list({"bool": _exact_flag, "double": _entire, "int": whole}[kind.scalar])
     return _words(word, kind.least, kind.most)

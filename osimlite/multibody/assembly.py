@@ -35,30 +35,69 @@ _FINEST = 1e-12
 """What a constraint may be off for rounding (m or rad)."""
 
 
+class UnmetConstraintsError(SimulationError):
+    """No pose fulfils the constraints of a model.
+
+    Args:
+        model: name of the model.
+        errors: for each constraint that is not met, by its path, how far the best pose is from
+            meeting it (m, or rad for constraints of angles).
+    """
+
+    def __init__(self, model: str, errors: Mapping[str, float]) -> None:
+        self.errors = dict(errors)
+        super().__init__(
+            f"no pose of '{model}' near the given one fulfils {listed([*self.errors])}; change the "
+            "coordinate values, unlock or unclamp coordinates, or set isEnforced of a constraint "
+            "to false"
+        )
+
+
 def assembled(mechanism: Mechanism, q: Array, time: float, kept: Collection[int] = ()) -> Array:
     """The coordinate values (n,) nearest to `q` (n,) that fulfil the constraints at `time` (s).
 
-    The coordinates with indices `kept` keep their values, as locked ones do.
+    The coordinates with indices `kept` keep their values, as locked ones do. Where no pose within
+    the ranges of the clamped coordinates fulfils the constraints, the ranges give way, as in OpenSim.
 
     Raises:
         SimulationError: there are none, or they are too far to be found.
     """
     infos = mechanism.coordinates
     held = {place: float(q[place]) for place, info in enumerate(infos) if info.locked or place in kept}
+    unclamped: Array | None = None
     while True:
-        result = _nearest(mechanism, q, time, held)
+        try:
+            result = _nearest(mechanism, q, time, held)
+        except SimulationError:
+            if unclamped is None:
+                raise
+            # OpenSim logs an error, relaxes the constraints, and its integrator then projects onto
+            # them without ranges.
+            return unclamped
         outside = {
-            place: float(np.clip(result[place], *info.range))
-            for place, info in enumerate(infos)
-            if info.clamped
-            and place not in held
-            and not info.range[0] - 1e-12 <= result[place] <= info.range[1] + 1e-12
+            place: float(np.clip(result[place], *mechanism.coordinates[place].range))
+            for place in find_unclamped(mechanism, result)
+            if place not in held
         }
         if not outside:
             return result
+        if unclamped is None:
+            unclamped = result
         # Whichever would leave its range furthest stays at the end of it; then the others may fit.
         worst = max(outside, key=lambda place: abs(outside[place] - result[place]))
         held[worst] = outside[worst]
+
+
+def find_unclamped(mechanism: Mechanism, q: Array) -> list[int]:
+    """Return the indices of the clamped coordinates whose values (n,) lie outside their ranges.
+
+    Prescribed coordinates are left out: no clamp binds them in OpenSim.
+    """
+    return [
+        index
+        for index, info in enumerate(mechanism.coordinates)
+        if info.clamped and info.prescribed is None and not info.range[0] - 1e-12 <= q[index] <= info.range[1] + 1e-12
+    ]
 
 
 def projected(state: Kinematics, kept: Collection[int] = ()) -> Array:
@@ -181,14 +220,13 @@ class _Search:
         if np.abs(errors).max(initial=0.0) <= self.tolerance:
             return q
         state = self._state(q)
-        broken = [
-            item.name
+        broken = {
+            item.name: float(np.abs(item.position_errors(state)).max(initial=0.0))
             for item in self.mechanism.constraints
-            if not np.abs(item.position_errors(state)).max(initial=0.0) <= self.tolerance
-        ]
-        raise SimulationError(
-            f"no pose of '{self.mechanism.name}' near the given one fulfils {listed(broken)}; change the coordinate "
-            "values, unlock or unclamp coordinates, or set isEnforced of a constraint to false"
+        }
+        raise UnmetConstraintsError(
+            self.mechanism.name,
+            {name: error for name, error in broken.items() if not error <= self.tolerance},
         )
 
     def _state(self, q: Array) -> Kinematics:

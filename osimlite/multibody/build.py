@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import copysign, pi
+
 import numpy as np
 
 from osimlite.errors import ModelError, UnsupportedError
@@ -11,7 +13,7 @@ from osimlite.multibody.extremes import any_numbers
 from osimlite.multibody.functions import Function
 from osimlite.multibody.joints import MOTIONS, Mobilizer, motion_types
 from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.motions import Motion
+from osimlite.multibody.motions import Motion, SphericalMotion
 from osimlite.multibody.parts import (
     GROUND,
     CoordinateInfo,
@@ -157,8 +159,11 @@ class _Builder:
             raise ModelError(f"the joint '{path}' connects '{parent}' to itself; name frames of two bodies")
         motions, coordinates = joint_motions(joint, path, opensim_derivatives=self.opensim_derivatives)
         first, count = len(self.coordinates), len(coordinates)
-        for coordinate, motion_type in zip(coordinates, motion_types(motions, count), strict=True):
+        middle = {motion.coordinates[1] for motion in motions if isinstance(motion, SphericalMotion)}
+        kinds = motion_types(motions, count)
+        for index, (coordinate, motion_type) in enumerate(zip(coordinates, kinds, strict=True)):
             own_path = self.placements.path(coordinate)
+            value = coordinate.default_value
             low, high = coordinate.range
             self.coordinates.append(
                 CoordinateInfo(
@@ -166,7 +171,7 @@ class _Builder:
                     path=own_path,
                     joint=path,
                     motion_type=motion_type,
-                    default_value=coordinate.default_value,
+                    default_value=avoid_right_angle(value) if index in middle else value,
                     default_speed=coordinate.default_speed_value,
                     range=(low, high),
                     clamped=coordinate.clamped,
@@ -266,6 +271,23 @@ class _Builder:
             if isinstance(constraint, Coupler):
                 place = constraint.dependent
                 self.coordinates[place] = replace(self.coordinates[place], yielding=True)
+
+
+RIGHT_ANGLE_GAP = 1e-6
+"""Distance (rad) from 90 degrees at which the second of three angles starts at the nearest."""
+
+
+def avoid_right_angle(angle: float) -> float:
+    """Return an angle (rad), moved to `RIGHT_ANGLE_GAP` from 90 or -90 degrees if it is nearer.
+
+    OpenSim describes ball and free joints by quaternions, which have no singular pose; the rates of
+    three angles are infinite where the second is exactly there. A motion that starts beside it is
+    the same within the gap.
+    """
+    gap = 0.5 * pi - abs(angle)
+    if abs(gap) >= RIGHT_ANGLE_GAP:
+        return angle
+    return copysign(0.5 * pi - RIGHT_ANGLE_GAP, angle)
 
 
 def mass_properties(body: Body, path: str) -> MassProperties:

@@ -277,9 +277,10 @@ class PiecewiseLinear(Univariate):
 
     @property
     def table(self) -> Sequence[float]:
-        """The lines, without the last point."""
-        lines = zip(pairwise(self.x), pairwise(self.y), strict=True)
-        return _pieces(self.x[:-1], [(y0, (y1 - y0) / (x1 - x0)) for (x0, x1), (y0, y1) in lines])
+        """The lines, without the last point; where two x are equal the value jumps to the later y."""
+        ends = zip(pairwise(self.x), pairwise(self.y), strict=True)
+        lines = [(x0, y0, (y1 - y0) / (x1 - x0)) for (x0, x1), (y0, y1) in ends if x1 > x0]
+        return _pieces([x0 for x0, _, _ in lines], [(y0, slope) for _, y0, slope in lines])
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,14 @@ class ConstraintReader:
         return FramePlacement(self.bodies[base], matrix)
 
     def _coordinate(self, owner: Component, field: str, value: str | Component) -> int:
-        return self.coordinates[self.placements.path(self.placements.tree.target(owner, field, value))]
+        path = self.placements.path(self.placements.tree.target(owner, field, value))
+        if path not in self.coordinates:
+            # Of a coordinate that stands several times in a joint, only the first moves something.
+            raise ModelError(
+                f"the {field} of '{self.placements.path(owner)}' is '{path}', which moves nothing; "
+                "give it a coordinate that a joint moves by"
+            )
+        return self.coordinates[path]
 
     def coupler(self, item: schema.CoordinateCouplerConstraint, path: str) -> Constraint:
         """One coordinate as a function of others."""

@@ -68,27 +68,54 @@ def _takes(function: Object, wanted: int, given: int) -> None:
 
 
 def _linear(function: schema.LinearFunction, arguments: int) -> f.Function:
-    *weights, start = function.coefficients or (0.0,)
-    _takes(function, len(weights), arguments)
-    return f.Linear(weights[0], start) if arguments == 1 else f.WeightedSum(tuple(weights), start)
+    count = len(function.coefficients)
+    if count <= arguments:
+        raise _Impossible(f"it has {count} coefficients; give {arguments + 1}, the constant last")
+    # OpenSim takes the coefficient behind the weights for the constant, and ignores the others.
+    weights, start = function.coefficients[:arguments], function.coefficients[arguments]
+    return f.Linear(weights[0], start) if arguments == 1 else f.WeightedSum(weights, start)
 
 
-def _points(function: Any, least: int, *, apart: bool) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """The abscissae and ordinates of a function that goes through points, checked."""
-    x, y = tuple(function.x), tuple(function.y)
+def _points(function: Any, least: int, *, apart: bool = False) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the abscissae and ordinates of a function that goes through points, checked.
+
+    Args:
+        function: with properties `x` and `y`; ordinates beyond the last abscissa are ignored, as in
+            OpenSim.
+        least: the number of points that it needs.
+        apart: whether no two abscissae may be equal.
+    """
+    x = tuple(function.x)
+    y = tuple(function.y)[: len(x)]
     if len(x) != len(y) or len(x) < least:
         raise _Impossible(f"it has {len(x)} x and {len(y)} y; give as many of both, at least {least}")
     if not all(map(isfinite, (*x, *y))):
         raise _Impossible("a point is not finite; give numbers")
     if any(after < before or (apart and after == before) for before, after in pairwise(x)):
-        raise _Impossible("its x do not increase; sort the points" + (" and remove repeated ones" if apart else ""))
+        repeated = " and remove repeated ones" if apart else ""
+        raise _Impossible(f"its x do not increase; sort the points{repeated}")
     return x, y
+
+
+def _piecewise_linear(function: schema.PiecewiseLinearFunction) -> f.Function:
+    x, y = _points(function, 1)
+    if len(x) == 1:
+        return f.Constant(y[0])
+    if x[0] == x[1] or x[-1] == x[-2]:
+        # The line that continues outside of the points would be vertical.
+        raise _Impossible("its first or last two x are equal; remove one of them")
+    return f.PiecewiseLinear(x, y)
+
+
+def _piecewise_constant(function: schema.PiecewiseConstantFunction) -> f.Function:
+    x, y = _points(function, 1)
+    return f.PiecewiseConstant(x, y) if len(x) > 1 else f.Constant(y[0])
 
 
 def _gcv(function: schema.GCVSpline) -> f.Function:
     half_order = function.half_order
-    if not 1 <= half_order <= 4:
-        raise _Impossible(f"its half_order is {half_order}; give 1 to 4")
+    if half_order < 1:
+        raise _Impossible(f"its half_order is {half_order}; give 1 or more, 2 for a cubic spline")
     x, y = _points(function, 2 * half_order, apart=True)
     # The linter values what it can without numpy.
     splines: Any = import_module("osimlite.multibody.smoothing_spline")
@@ -98,8 +125,11 @@ def _gcv(function: schema.GCVSpline) -> f.Function:
 
 def _step(function: schema.StepFunction) -> f.Function:
     start, end = function.transition_start_time, function.transition_end_time
+    if start > end:
+        # OpenSim follows the same curve from its other end.
+        return f.Step(end, start, function.end_value, function.start_value)
     if not start < end:
-        raise _Impossible(f"its transition ends at {end:g} and starts at {start:g}; let it end later than it starts")
+        raise _Impossible(f"its transition ends where it starts, at {end:g}; let it end elsewhere")
     return f.Step(start, end, function.start_value, function.end_value)
 
 
@@ -113,8 +143,8 @@ _UNIVARIATE: dict[type[Object], Callable[[Any], f.Function]] = {
     schema.PolynomialFunction: lambda item: f.Polynomial(_floats(item.coefficients)),
     schema.Sine: lambda item: f.Sine(item.amplitude, item.omega, item.phase, item.offset),
     schema.StepFunction: _step,
-    schema.PiecewiseConstantFunction: lambda item: f.PiecewiseConstant(*_points(item, 2, apart=False)),
-    schema.PiecewiseLinearFunction: lambda item: f.PiecewiseLinear(*_points(item, 2, apart=True)),
-    schema.SimmSpline: lambda item: f.SimmSpline(*_points(item, 2, apart=False)),
+    schema.PiecewiseConstantFunction: _piecewise_constant,
+    schema.PiecewiseLinearFunction: _piecewise_linear,
+    schema.SimmSpline: lambda item: f.SimmSpline(*_points(item, 2)),
     schema.GCVSpline: _gcv,
 }

@@ -6,11 +6,11 @@ from osimlite.backends.symbolic import on_symbols
 from osimlite.backends.symbols import Vector
 from osimlite.errors import ModelError, SettingError
 from osimlite.kernels.programs import compute
+from osimlite.multibody.formula import Formula, program
 from osimlite.optimal.point import Ends, Terms
 from osimlite.optimal.point import Formula as Value
 from osimlite.optimal.problem import Problem
 from osimlite.schema.moco.goals import MocoExpressionBasedParameterGoal
-from osimlite.simulation.elements.formula import Formula, program
 from osimlite.sweep.properties import places
 
 

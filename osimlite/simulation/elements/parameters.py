@@ -8,10 +8,10 @@ from typing import Any
 
 from osimlite.errors import ModelError
 from osimlite.kernels.controls import with_reflex
+from osimlite.multibody.formula import Formula, program
 from osimlite.multibody.function_tables import table_of_one
 from osimlite.multibody.functions import Function
 from osimlite.records import dataclass
-from osimlite.simulation.elements.formula import Formula, program
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kernel_text import arguments_of
 

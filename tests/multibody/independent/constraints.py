@@ -40,7 +40,9 @@ def bond(constraint: Constraint, state: Moved) -> Bond:
             rates = mechanism.coordinate_rates(q, u)[others]
             np.add.at(row[0], others, gradient)
             row[0, dependent] -= 1.0
-            drift = -(row @ mechanism.rate_bias(q, u)) - rates @ hessian @ rates
+            # Of a coupler without independent coordinates the Hessian is an empty list.
+            bends = np.reshape(hessian, (len(others), len(others)))
+            drift = -(row @ mechanism.rate_bias(q, u)) - rates @ bends @ rates
             return Bond(np.array((value - q[dependent],)), row @ mechanism.rate_matrix(q), np.zeros(1), drift)
         case b.PointConstraint():
             return meeting(state, constraint.first, constraint.second).bond()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from osimlite.errors import ModelError
 from osimlite.forces.formulas import FUNCTIONS
 from osimlite.kernels.programs import STEPS, of_two
-from osimlite.simulation.elements.formula import Formula, program
+from osimlite.multibody.formula import Formula, program
 
 
 def value(text, q=0.7, u=-1.3):
