@@ -52,6 +52,10 @@ class Checked:
         """Measure what rules about measures speak of, or recall it; why that cannot be done, if it cannot."""
         return ""
 
+    def find_obstacles(self, *, anew: bool = True) -> str:
+        """Find what stops a computation, for rules that report it; return why not, if that fails."""
+        return ""
+
     def path(self, item: Object | None) -> str:
         """The absolute path of the component an object belongs to."""
         return ""

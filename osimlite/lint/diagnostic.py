@@ -156,7 +156,7 @@ class Report:
         """
         parts = [text.partition(NOT_MEASURED) for text in self.unmeasured]
         return [
-            (file, f"rules OSIM63 (paths and muscles) not measured: {reason}")
+            (file, f"rules OSIM42, OSIM53 and OSIM63 (construction, paths, muscles) not measured: {reason}")
             for file, _, reason in parts
             if reason.startswith("needs osimlite[")
         ]

@@ -19,6 +19,7 @@ from osimlite.errors import SpecialFileError
 from osimlite.lint import rules
 from osimlite.lint.checked import Checked, Where
 from osimlite.lint.config import Config, Threshold
+from osimlite.lint.construction import CONSTRUCTION
 from osimlite.lint.diagnostic import NOT_MEASURED, Finding, Fix, Report, Severity
 from osimlite.lint.faults import Fault, faults_in
 from osimlite.lint.measures import MEASURES
@@ -117,7 +118,7 @@ class Rule:
     `severity` is that of its findings unless it says otherwise of one; `before` has another for documents older than a
     version, where OpenSim does something else with them. `mends` says of what kind its mends are, `about` what it looks
     at: ``model``, ``table``, ``document`` (a setup, or a part of one), ``measures`` (of the model's paths and muscles),
-    ``trial`` (what was measured of a finished one).
+    ``construction`` (what stops the computation of a model), ``trial`` (what was measured of a finished one).
     A rule that tells faults apart is a `group`: there is a rule for each `fault`, all with the same `check`.
     """
 
@@ -296,10 +297,15 @@ def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Repo
     findings: list[Finding] = []
     wanted = [known for known in all_rules(subject.about) if subject.config.wants(known) and subject.is_for(known)]
     measuring = [known for known in wanted if known.about == MEASURES]
-    why_not = ""
+    building = [known for known in wanted if known.about == CONSTRUCTION]
+    why_not = unbuilt = ""
+    if building:
+        unbuilt = subject.find_obstacles(anew=measure) if measure or recall else "nobody asked"
     if measuring:
         why_not = subject.unmeasured(anew=measure) if measure or recall else "nobody asked"
-    left_out = measuring if why_not else []
+    left_out = [*(measuring if why_not else []), *(building if unbuilt else [])]
+    # What stops a computation is not reported where another rule has reported its cause.
+    wanted.sort(key=lambda known: known.about == CONSTRUCTION)
     checks: dict[Check, dict[str, Rule]] = {}
     for known in wanted:
         if known not in left_out:
@@ -314,6 +320,7 @@ def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Repo
         findings = _not_ignored(subject, comments, findings, left_out)
     unique = list(dict.fromkeys(findings))
     unique.sort(key=lambda finding: (finding.line or 0, finding.column or 0, finding.code))
+    why_not = why_not or unbuilt
     is_skipped = bool(why_not) and measure
     return Report(unique, unmeasured=[f"{subject.file or 'the model'}{NOT_MEASURED}{why_not}"] if is_skipped else [])
 

@@ -15,6 +15,7 @@ from osimlite.document.survey import Survey
 from osimlite.errors import DocumentError, SpecialFileError
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
+from osimlite.lint.construction import CONSTRUCTION, find_obstacles, may_fail
 from osimlite.lint.measures import MEASURES, has_measures, unmeasured
 from osimlite.lint.words import called
 from osimlite.schema.base import Component, Object, Unknown
@@ -89,6 +90,8 @@ class Subject(Checked):
         """Whether a rule has anything to look at; of a text with a syntax error only what is said in one place."""
         if rule.about == MEASURES and self.about == "model":
             return self.model is not None and self.sure_until is None and has_measures(self)
+        if rule.about == CONSTRUCTION and self.about == "model":
+            return self.model is not None and self.sure_until is None and self._may_fail
         if rule.about != self.about:
             return False
         if rule.code[4] == "0":
@@ -98,6 +101,14 @@ class Subject(Checked):
     def unmeasured(self, *, anew: bool = True) -> str:
         """Measure paths and muscles of the model, or recall it; why that cannot be done, if it cannot."""
         return unmeasured(self, anew=anew)
+
+    def find_obstacles(self, *, anew: bool = True) -> str:
+        """Build the model, or recall what stops that; return why it was not built, if it was not."""
+        return find_obstacles(self, anew=anew)
+
+    @cached_property
+    def _may_fail(self) -> bool:
+        return may_fail(self)
 
     @cached_property
     def folder(self) -> Path | None:

@@ -44,7 +44,7 @@ def unmeasured(report: Report) -> str:
         return ""
     count = len(report.unmeasured) - 1
     more = f" (and {count} more {_plural('file', count)})" if count else ""
-    return visible(f"Paths and muscles (OSIM63): {report.unmeasured[0]}{more}.")
+    return visible(f"Construction, paths and muscles (OSIM42, OSIM53, OSIM63): {report.unmeasured[0]}{more}.")
 
 
 def passed(report: Report, everything: bool) -> str:

@@ -1,0 +1,169 @@
+"""Reasons why a model cannot be computed, for the rules that report them.
+
+The linter works without a numeric library. `osimlite.measuring.construction` builds the mechanism
+and the forces, assembles the default pose and evaluates one acceleration. It is loaded by its name,
+and only for models whose construction may fail.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from enum import StrEnum
+from hashlib import blake2b
+from importlib import import_module
+from typing import TYPE_CHECKING, NamedTuple, cast
+
+from osimlite._require import absent
+from osimlite.errors import OsimliteError
+from osimlite.lint.measures import NEEDS_SIM
+
+if TYPE_CHECKING:
+    from osimlite.lint.subject import Subject
+
+CONSTRUCTION = "construction"
+"""What the rules are about that report obstacles to a computation."""
+
+REMEMBERED_MODELS = 16
+"""Number of texts whose obstacles stay in memory."""
+
+
+class Stage(StrEnum):
+    """Where a computation stops, or what it finds."""
+
+    MECHANISM = "mechanism"
+    FORCE = "force"
+    ASSEMBLY = "assembly"
+    CLAMP = "clamp"
+    INERTIA = "inertia"
+    ACCELERATION = "acceleration"
+    RATE = "rate"
+    UNSUPPORTED = "unsupported"
+
+
+class Obstacle(NamedTuple):
+    """A reason why a model cannot be computed, or is computed otherwise than it says."""
+
+    stage: Stage
+    path: str  # absolute path of the component at fault, empty if it is not known
+    message: str  # what is wrong, without the next step
+
+
+SIMPLE_CLASSES = frozenset(
+    (
+        "Body",
+        "Ground",
+        "Model",
+        "PinJoint",
+        "SliderJoint",
+        "WeldJoint",
+        "PlanarJoint",
+        "Coordinate",
+        "PhysicalOffsetFrame",
+        "BodySet",
+        "JointSet",
+        "ForceSet",
+        "ConstraintSet",
+        "MarkerSet",
+        "ControllerSet",
+        "ContactGeometrySet",
+        "ProbeSet",
+        "ComponentSet",
+        "ModelVisualPreferences",
+        "ModelDisplayHints",
+        "FrameGeometry",
+        "Appearance",
+        "SurfaceProperties",
+        "WrapObjectSet",
+        "Mesh",
+        "Brick",
+        "Sphere",
+        "Ellipsoid",
+        "Cylinder",
+        "Cone",
+        "Torus",
+        "LineGeometry",
+        "Arrow",
+        "Marker",
+        "ContactSphere",
+        "ContactHalfSpace",
+        "HuntCrossleyForce",
+        "HuntCrossleyContactParameters",
+        "HuntCrossleyContactParametersSet",
+        "CoordinateLimitForce",
+        "CoordinateActuator",
+        "SpringGeneralizedForce",
+        "Constant",
+        "LinearFunction",
+    )
+)
+"""Classes that cannot stop a computation where no other rule reports an error."""
+
+_memory: OrderedDict[str, list[Obstacle]] = OrderedDict()
+
+
+def may_fail(subject: Subject) -> bool:
+    """Return whether building a model may find more than the rules that need no numbers.
+
+    Trees of pins, slides and planes under simple forces cannot fail if every body has mass and
+    inertia; their numbers are checked one by one.
+    """
+    if any(cls.__name__ not in SIMPLE_CLASSES for cls in subject.by_class):
+        return True
+    if any(item.prescribed for item in subject.named("Coordinate")):
+        return True
+    return any(not body.mass > 0.0 or not min(body.inertia[:3]) > 0.0 for body in subject.named("Body"))
+
+
+def find_obstacles(subject: Subject, *, anew: bool = True) -> str:
+    """Find what stops the computation of a model, and keep it with the subject.
+
+    Args:
+        subject: with the model.
+        anew: whether the model is built; otherwise only remembered results are taken.
+
+    Returns:
+        Why the model was not built; empty if it was, or if there was no need to.
+    """
+    if CONSTRUCTION in subject.kept:
+        return ""
+    if missing := absent("numpy"):
+        return f"{NEEDS_SIM} ({' and '.join(missing)} is not installed); run: pip install 'osimlite[sim]'"
+    key = None if subject.source is None else _digest(subject)
+    obstacles = _memory.get(key) if key is not None else None
+    if obstacles is None:
+        if not anew:
+            return "nobody asked"
+        obstacles = _try_construction(subject)
+    subject.kept[CONSTRUCTION] = obstacles
+    if key is not None:
+        _memory[key] = obstacles
+        _memory.move_to_end(key)
+        while len(_memory) > REMEMBERED_MODELS:
+            _memory.popitem(last=False)
+    return ""
+
+
+def obstacles_of(subject: Subject, *stages: Stage) -> list[Obstacle]:
+    """Return the obstacles of a model that were found in some stages."""
+    known = cast("list[Obstacle]", subject.kept.get(CONSTRUCTION, []))
+    return [obstacle for obstacle in known if obstacle.stage in stages]
+
+
+def _digest(subject: Subject) -> str:
+    # Meshes and tables beside the model may be others in another folder.
+    text = f"{subject.folder}\n".encode("utf-8", "replace") + subject.data
+    return blake2b(text, digest_size=16).hexdigest()
+
+
+def _try_construction(subject: Subject) -> list[Obstacle]:
+    from osimlite.schema.tree import lent
+
+    assert subject.model is not None
+    try_construction = import_module("osimlite.measuring.construction").try_construction
+    with lent(subject.tree):
+        try:
+            result: list[Obstacle] = try_construction(subject.model, subject.folder)
+        except (ArithmeticError, ValueError, OsimliteError) as error:
+            # Numbers beyond what can be computed with, of which other rules report.
+            result = [Obstacle(Stage.MECHANISM, "", str(getattr(error, "message", error)))]
+    return result

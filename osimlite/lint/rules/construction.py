@@ -1,0 +1,253 @@
+"""OSIM42x and OSIM53x: what stops the computation of a model."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from osimlite.lint.construction import CONSTRUCTION, Obstacle, Stage, obstacles_of
+from osimlite.lint.diagnostic import Severity
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
+from osimlite.lint.subject import Subject
+from osimlite.schema.base import Unknown
+from osimlite.schema.registry import further_classes
+from osimlite.text import counted
+
+_QUOTED = re.compile(r"'([^']+)'")
+
+
+@rule("OSIM421", "impossible-mechanism", severity=ERROR, about=CONSTRUCTION)
+def impossible_mechanism(subject: Subject, report: FindingSink) -> None:
+    """The bodies, joints and constraints of a model make no mechanism.
+
+    Builds the mechanism as `osimlite simulate` does, and reports what stops that: a joint, frame,
+    function or constraint that has no meaning, and that no other rule has reported.
+
+    OpenSim refuses such a model, or computes with what happens to be in memory. No command that
+    computes takes it.
+
+    ```xml
+      <Coordinate name="knee_angle">
+          <prescribed>true</prescribed>
+          <prescribed_function>
+    -         <PiecewiseLinearFunction> <x>0 0 1</x> <y>0 -0.1 -0.5</y> </PiecewiseLinearFunction>
+    +         <PiecewiseLinearFunction> <x>0 0.5 1</x> <y>0 -0.1 -0.5</y> </PiecewiseLinearFunction>
+          </prescribed_function>
+      </Coordinate>
+    ```
+    """
+    for obstacle in _unreported(subject, report, Stage.MECHANISM):
+        _report(subject, report, obstacle, obstacle.message)
+
+
+@rule("OSIM422", "unmet-constraint", severity=ERROR, about=CONSTRUCTION)
+def unmet_constraint(subject: Subject, report: FindingSink) -> None:
+    """No pose of the model fulfils a constraint.
+
+    Assembles the default pose, and reports each constraint that the nearest pose does not fulfil,
+    with how far it is from that (m, or rad for constraints of angles).
+
+    OpenSim logs that it is unable to assemble the model and relaxes the constraints; its
+    integrator then refuses to start. Usual causes are a length in millimetres, both ends on one
+    body, and two locked or prescribed coordinates that a constraint connects.
+
+    ```xml
+      <ConstantDistanceConstraint name="rod">
+          <socket_body_1>/bodyset/thigh</socket_body_1>
+          <socket_body_2>/bodyset/shank</socket_body_2>
+    -     <constant_distance>40</constant_distance>
+    +     <constant_distance>0.4</constant_distance>
+      </ConstantDistanceConstraint>
+    ```
+    """
+    for obstacle in _unreported(subject, report, Stage.ASSEMBLY):
+        _report(subject, report, obstacle, f"{obstacle.message}: OpenSim cannot start from it")
+
+
+@rule("OSIM423", "range-not-kept", severity=WARNING, about=CONSTRUCTION)
+def range_not_kept(subject: Subject, report: FindingSink) -> None:
+    """A clamped coordinate leaves its range in the default pose.
+
+    Assembles the default pose, and reports clamped coordinates that a constraint or their
+    prescribed function takes out of their range.
+
+    OpenSim logs an error for a constraint, and nothing for a function; then it simulates, and the
+    clamp has no effect. Widen the range, or correct the constraint.
+
+    ```xml
+      <Coordinate name="knee_angle">
+          <range>-2.1 0</range>
+          <clamped>true</clamped>
+          <prescribed>true</prescribed>
+    -     <prescribed_function> <Constant> <value>0.5</value> </Constant> </prescribed_function>
+    +     <prescribed_function> <Constant> <value>-0.5</value> </Constant> </prescribed_function>
+      </Coordinate>
+    ```
+    """
+    for obstacle in _unreported(subject, report, Stage.CLAMP):
+        _report(subject, report, obstacle, f"{obstacle.message}; OpenSim simulates without the clamp")
+
+
+@rule("OSIM424", "singular-mass-matrix", severity=ERROR, about=CONSTRUCTION)
+def singular_mass_matrix(subject: Subject, report: FindingSink) -> None:
+    """A coordinate moves no mass in the default pose.
+
+    Evaluates the accelerations in the default pose, and reports the coordinate without inertia:
+    nothing beyond its joint has mass, or its axis is that of another coordinate of a body without
+    mass.
+
+    The mass matrix has no inverse. OpenSim gives no message: every acceleration is NaN, or of a
+    size that only rounding decides.
+
+    ```xml
+    - <Body name="shank"> <mass>0</mass>
+    + <Body name="shank"> <mass>3</mass>
+          <inertia>0.05 0.05 0.005 0 0 0</inertia> </Body>
+      <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+      <PinJoint name="ankle">
+          <socket_parent_frame>shank_ankle</socket_parent_frame>
+          <socket_child_frame>/bodyset/foot</socket_child_frame>
+          <coordinates> <Coordinate name="ankle_angle" /> </coordinates>
+          <frames>
+              <PhysicalOffsetFrame name="shank_ankle">
+                  <socket_parent>/bodyset/shank</socket_parent> <translation>0 0.2 0</translation>
+              </PhysicalOffsetFrame>
+          </frames>
+      </PinJoint>
+    ```
+    """
+    if _has_error(report, "2456"):
+        return
+    for obstacle in _unreported(subject, report, Stage.INERTIA):
+        message = f"{obstacle.message}: OpenSim computes NaN, or accelerations without meaning"
+        _report(subject, report, obstacle, message)
+
+
+@rule("OSIM531", "impossible-force", severity=ERROR, about=CONSTRUCTION)
+def impossible_force(subject: Subject, report: FindingSink) -> None:
+    """A force, a controller or a probe has no meaning.
+
+    Makes all forces, controllers and probes as `osimlite simulate` does, and reports what stops
+    that and no other rule has reported.
+
+    OpenSim refuses such a model when it builds the system, or fails when it needs the force. No
+    command that computes takes it.
+
+    ```xml
+      <ComponentSet>
+          <objects>
+              <Station name="sole"> <socket_parent_frame>/bodyset/shank</socket_parent_frame> </Station>
+          </objects>
+      </ComponentSet>
+      <MeyerFregly2016Force name="contact">
+          <socket_station>/componentset/sole</socket_station>
+    -     <stiffness>0.1</stiffness>
+    +     <stiffness>10000</stiffness>
+      </MeyerFregly2016Force>
+    ```
+    """
+    for obstacle in _unreported(subject, report, Stage.FORCE):
+        _report(subject, report, obstacle, obstacle.message)
+
+
+@rule("OSIM532", "no-acceleration", severity=ERROR, about=CONSTRUCTION)
+def no_acceleration(subject: Subject, report: FindingSink) -> None:
+    """The accelerations of a model are no numbers in the default pose.
+
+    Evaluates the accelerations in the default pose, and reports the forces that give none. It is a
+    warning where only a state of a muscle has no rate, as before its equilibrium.
+
+    OpenSim gives no message: every acceleration is NaN from the start, and so is the motion.
+
+    ```xml
+      <ExpressionBasedCoordinateForce name="spring">
+          <coordinate>hip_flexion</coordinate>
+    -     <expression>-1/q</expression>
+    +     <expression>-1/(q+1)</expression>
+      </ExpressionBasedCoordinateForce>
+    ```
+    """
+    for obstacle in _unreported(subject, report, Stage.ACCELERATION):
+        if obstacle.path or not _has_error(report, "2456"):
+            _report(subject, report, obstacle, obstacle.message)
+    for obstacle in _unreported(subject, report, Stage.RATE):
+        _report(subject, report, obstacle, obstacle.message, severity=WARNING)
+
+
+@rule("OSIM533", "not-computed", severity=INFO, about=CONSTRUCTION)
+def not_computed(subject: Subject, report: FindingSink) -> None:
+    """OpenSim runs a component that osimlite cannot compute.
+
+    Reports joints, constraints, forces and controllers of OpenSim's own classes that
+    `osimlite simulate` and the other commands that compute do not know. Of each class, the first
+    is reported, with the number of the others.
+
+    The model is as it should be. Commands that compute refuse it, or leave the component out with
+    `--skip-unsupported`.
+
+    ```xml
+      <Coordinate name="knee_angle">
+          <prescribed>true</prescribed>
+          <prescribed_function>
+    -         <ExpressionBasedFunction>
+    -             <variables>t</variables> <expression>-0.2*t</expression>
+    -         </ExpressionBasedFunction>
+    +         <LinearFunction> <coefficients>-0.2 0</coefficients> </LinearFunction>
+          </prescribed_function>
+      </Coordinate>
+    ```
+    """
+    groups: dict[object, list[Obstacle]] = {}
+    for obstacle in _unreported(subject, report, Stage.UNSUPPORTED):
+        item = subject.tree.by_path.get(obstacle.path)
+        # Who declares the classes of a plug-in knows what they are.
+        if not isinstance(item, Unknown) and type(item).tag not in further_classes():
+            groups.setdefault(type(item), []).append(obstacle)
+    for first, *others in groups.values():
+        more = f"; {counted(len(others), 'other')} of its class" if others else ""
+        known = subject.tree.by_path.get(first.path)
+        reason = first.message.partition(";")[0]
+        if known is not None and reason.startswith(f"'{first.path}' ("):
+            # Forces are named with their class, and why it cannot be computed.
+            reason = reason.removeprefix(f"'{first.path}' (").removesuffix(")")
+            reason = f"'{known.name}', a {reason}"
+        message = f"osimlite cannot compute this, OpenSim can: {reason}{more}"
+        _report(subject, report, first, message)
+
+
+def _unreported(subject: Subject, report: FindingSink, stage: Stage) -> Iterator[Obstacle]:
+    """Yield the obstacles of a stage whose cause no other rule has reported."""
+    errors = [item for item in report.findings if item.severity == ERROR]
+    places = {item.component for item in errors if item.component}
+    # A file that is missing stops what needs it.
+    causes = [*errors, *(item for item in report.findings if item.code.startswith("OSIM7"))]
+    named = {word for item in causes for word in _QUOTED.findall(item.message)}
+    for obstacle in obstacles_of(subject, stage):
+        words = {word.strip("/") for word in _QUOTED.findall(obstacle.message)}
+        if words & named or any(_is_related(obstacle.path, place) for place in places):
+            continue
+        if not obstacle.path and errors:
+            continue
+        yield obstacle
+
+
+def _is_related(path: str, place: str) -> bool:
+    """Return whether two components are the same, or one is a part of the other, but not of the model."""
+    if not path or place == "/":
+        return False
+    return path == place or place.startswith(f"{path}/") or path.startswith(f"{place}/")
+
+
+def _has_error(report: FindingSink, families: str) -> bool:
+    return any(item.severity == ERROR and item.code[4] in families for item in report.findings)
+
+
+def _report(
+    subject: Subject,
+    report: FindingSink,
+    obstacle: Obstacle,
+    message: str,
+    severity: Severity | None = None,
+) -> None:
+    item = subject.tree.by_path.get(obstacle.path, subject.model)
+    report(message.replace("; 'osimlite validate' lists every such place", ""), item, severity=severity)
