@@ -49,6 +49,24 @@ def without_element(source: Source | None, number: int) -> Fix | None:
     return Fix((_whole_line(source.text, span.start, span.end),), True)
 
 
+def as_comment(source: Source | None, number: int) -> Fix | None:
+    """Return the fix that makes an element of text an XML comment, or deletes it if it is empty.
+
+    A text that a comment cannot hold is left as it is: there is no fix then.
+    """
+    if source is None:
+        return None
+    span = source.spans[number]
+    if source.children(number):
+        return None
+    text = source.text[span.tag_end : span.inner_end].strip() if span.inner_end < span.end else ""
+    if not text:
+        return without_element(source, number)
+    if "--" in text or text.endswith("-") or "<" in text:
+        return None
+    return Fix((Edit(span.start, span.end, f"<!-- {text} -->"),), True)
+
+
 def without_attribute(source: Source | None, number: int, name: str) -> Fix | None:
     """Take an attribute out."""
     if source is None:

@@ -66,6 +66,39 @@ _OLD: Final[dict[str, dict[str, Successor]]] = {
     "WeldConstraint": {f"body_{n}": Successor(30505, f"socket_frame{n}") for n in (1, 2)},
     "Component": {"connectors": Successor(30508, None, "write one <socket_...> element for each")},
 }
+_UNUSED: Final[dict[str, dict[str, str]]] = {
+    "MovingPathPoint": {"location": "its functions give the place"},
+    "Component": {"VisibleObject": "OpenSim 4 draws by attached_geometry and Appearance"},
+    "Thelen2003Muscle": {tag: "this muscle has never had it" for tag in ("Vmax", "Vmax0", "damping", "muscle_model")},
+    "Millard2012EquilibriumMuscle": {
+        tag: "this muscle has no such part"
+        for tag in (
+            "MuscleFirstOrderActivationDynamicModel",
+            "MuscleSecondOrderActivationDynamicModel",
+            "ForceVelocityInverseCurve",
+        )
+    },
+    "ForceSet": {"datafile": "ExternalLoads name the file with the forces"},
+    "Joint": {"use_euler_angles": "a CustomJoint or GimbalJoint has angles anyway"},
+    "Schutte1993Muscle_Deprecated": {"force_velocity_curve": "its law has no such curve"},
+    "Coordinate": {
+        tag: "a spring or a limit force does that"
+        for tag in (
+            "stiffness",
+            "restraint_function",
+            "restraint_active",
+            "min_restraint_function",
+            "max_restraint_function",
+            "keys",
+        )
+    },
+    "SmoothSphereHalfSpaceForce": {"derivative_smoothing": "no release has read it"},
+}
+"""Tags of real files that OpenSim 4.6 reads in no version of a document, and what does their work."""
+_COMMENTS: Final = frozenset(
+    ("annotation", "annotations", "comment", "comments", "note", "notes", "remark", "remarks", "todo")
+)
+"""Tags, in small letters, of elements that programs write for comments."""
 _CONNECTEE = re.compile(r"(?:socket|connector)_(\w+?)(?:_connectee_name)?s?")
 
 
@@ -80,3 +113,17 @@ def successor(cls: type[Object], tag: str) -> Successor | None:
     if match is not None and f"socket_{match[1]}" in specs:
         return Successor(30517, f"socket_{match[1]}")
     return None
+
+
+def reason_unused(cls: type[Object], tag: str) -> str | None:
+    """Return what does the work of a tag that no version of OpenSim reads in a class, or None."""
+    for base in cls.__mro__:
+        reason = _UNUSED.get(base.__name__, {}).get(tag)
+        if reason is not None:
+            return reason
+    return None
+
+
+def is_comment(tag: str) -> bool:
+    """Return whether an element with this tag is a comment that a program wrote as an element."""
+    return tag.lower() in _COMMENTS

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable, Mapping
 
 from osimlite.document.notes import Note
 from osimlite.lint.engine import ERROR, FindingSink, rule
 from osimlite.lint.fixes import renamed, replaced
+from osimlite.lint.old_tags import successor
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Held
 from osimlite.schema.model import Model
-from osimlite.schema.registry import tags, tags_of
+from osimlite.schema.registry import class_for, tags, tags_of
 from osimlite.schema.specs import FieldSpec, field_specs
 from osimlite.text import nearest
 
@@ -22,7 +24,8 @@ def unknown_class(subject: Subject, found: FindingSink) -> None:
     """An object is of a class that OpenSim does not have.
 
     Reports elements that should be objects and are of no class of OpenSim 4.6: misspelt, in the wrong case, or of a
-    plug-in. Names the nearest class that may stand there.
+    plug-in. Names the class that is meant if the spelling is a slip away from it, it may stand there, and it has the
+    properties that the element gives.
 
     In a set (bodies, joints, forces ...) OpenSim refuses to load the file; elsewhere it leaves the object out. Of a
     plug-in, OpenSim must have loaded that plug-in first; the rest of the file is checked all the same. With the file
@@ -40,13 +43,84 @@ def unknown_class(subject: Subject, found: FindingSink) -> None:
     for note, owner in subject.notes_of("unknown-class"):
         fate = _fate(subject, note)
         accepted = tags() if note.spec is None or note.spec.accepts is None else tags_of(note.spec.accepts)
-        suggestion = nearest(note.word, accepted) or nearest(note.word, tags(), cutoff=80)
+        suggestion = _nearest_class(subject, note, accepted)
         message = f"OpenSim has no class '{note.word}' and {fate}"
-        if suggestion is None:
+        plugin = plugin_of(note.word)
+        if plugin:
+            message += f"; it belongs to {plugin}: load that first; nothing in it was checked"
+        elif suggestion is None or suggestion.lower() != note.word.lower():
             message += "; if it belongs to a plug-in, load that first: nothing in it was checked"
         same = suggestion is not None and suggestion.lower() == note.word.lower()
         fix = renamed(subject.source, note.number, suggestion, safe=same)
         found(message, owner, number=note.number, suggestion=suggestion, fix=fix)
+
+
+PLUGINS = {
+    "Smith2018": "the plug-in JAM (opensim-jam)",
+    "WISCO_": "the plug-in of the University of Wisconsin (opensim_htc), the predecessor of JAM",
+    "UWLigament": "the plug-in of the University of Wisconsin (opensim_htc), the predecessor of JAM",
+}
+"""Plug-ins by the beginning of the names of their classes."""
+
+
+def plugin_of(name: str) -> str:
+    """Return the known plug-in that a class belongs to; an empty text for others."""
+    return next((plugin for start, plugin in PLUGINS.items() if name.startswith(start)), "")
+
+
+def _nearest_class(subject: Subject, note: Note, accepted: Iterable[str]) -> str | None:
+    """Return the class that a misspelt tag of an object means, or None.
+
+    Another class is another physics, so the spelling must be a slip away: at most two letters
+    missing, added, exchanged or swapped. The class may stand there, OpenSim 4.6 has it, and at
+    least half of the elements inside are properties of it.
+    """
+    word = note.word.rpartition(":")[2]
+    if plugin_of(word):
+        return None
+    known = [tag for tag in accepted if not _is_later(tag)]
+    whole = {note.word.lower(), word.lower()}
+    same = [tag for tag in known if tag.lower() in whole]
+    candidates = same or [tag for tag in known if _is_slip(note.word, tag) or _is_slip(word, tag)]
+    best = nearest(note.word, candidates, cutoff=0) if candidates else None
+    if best is None or subject.source is None:
+        return best
+    children = [subject.source.spans[child].tag for child in subject.source.children(note.number)]
+    cls = class_for(best)
+    specs = field_specs(cls) if cls is not None else {}
+    fitting = sum(tag in specs or _is_part(specs, tag) or is_old(cls, tag) for tag in children)
+    return best if 2 * fitting >= len(children) else None
+
+
+def _is_slip(word: str, tag: str) -> bool:
+    """Return whether a word is a misspelling of a tag, rather than a longer or another name."""
+    from rapidfuzz.distance import OSA
+
+    one, other = word.lower(), tag.lower()
+    distance = OSA.distance(one, other)
+    if distance > (2 if len(tag) > 6 else 1):
+        return False
+    # A prefix such as My or UW makes another class of it.
+    return distance < 2 or not (one.endswith(other) or one.startswith(other))
+
+
+def _is_later(tag: str) -> bool:
+    """Return whether OpenSim has a class only after 4.6."""
+    cls = class_for(tag)
+    return cls is not None and bool(cls.since)
+
+
+def is_old(cls: type[Object] | None, tag: str) -> bool:
+    """Return whether a tag belonged to a class in an older version of the format."""
+    return cls is not None and successor(cls, tag) is not None
+
+
+def _is_part(specs: Mapping[str, FieldSpec], tag: str) -> bool:
+    """Return whether an object of a class may be a part of an object with these properties."""
+    part = class_for(tag)
+    if part is None:
+        return False
+    return any(spec.accepts is not None and issubclass(part, spec.accepts) for spec in specs.values())
 
 
 @rule("OSIM103", "wrong-class", severity=ERROR)

@@ -63,8 +63,11 @@ def wrong_coordinate_count(subject: Subject, found: FindingSink) -> None:
         names, declared_names = names_on_axes(custom), [coordinate.name for coordinate in coordinates_of(custom)]
         if axes_refused(custom) and all(name in declared_names for name in names):
             unused = [f"'{name}'" for name in declared_names if name not in names]
+            reason = f"no axis of {called(custom)} uses {listed(unused)}"
+            if not unused:
+                reason = f"{called(custom)} declares more coordinates than its axes use"
             found(
-                f"no axis of {called(custom)} uses {listed(unused)}: OpenSim refuses the model",
+                f"{reason}: OpenSim refuses the model",
                 custom,
                 number=subject.element_of(custom, "coordinates"),
             )

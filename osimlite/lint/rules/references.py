@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple, cast
 
+from osimlite.document.source import Source
 from osimlite.lint.axes import axes_refused, made_up_paths
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced
@@ -134,6 +135,9 @@ def reference_form(subject: Subject, found: FindingSink) -> None:
         _report(subject, found, broken, message)
     for change in subject.changes:
         if change.step == "set_levels" and subject.source is not None:
+            if _is_repeated(subject.source, change.number):
+                # OpenSim reads the first of several connectors of one name.
+                continue
             # In files of the time a name stood in an element of its own inside a connector.
             inner = next(iter(subject.source.children(change.number)), change.number)
             place = subject.source.of_text(inner)
@@ -144,6 +148,26 @@ def reference_form(subject: Subject, found: FindingSink) -> None:
                 "there and refuses the model; `osimlite upgrade` writes the path anew",
                 at=place,
             )
+
+
+def _is_repeated(source: Source, number: int) -> bool:
+    """Return whether an element has the tag and the name of another before it in the same element."""
+    span = source.spans[number]
+    above = None
+    for index in range(number):
+        if source.spans[index].start < span.start and span.end <= source.spans[index].end:
+            above = index
+    if above is None:
+        return False
+    name = source.attributes_of(number).get("name")
+    for index in source.children(above):
+        if index >= number:
+            return False
+        other = source.attributes_of(index).get("name")
+        names = [attribute.value for attribute in (name, other) if attribute is not None]
+        if source.spans[index].tag == span.tag and len(names) == 2 and names[0] == names[1]:
+            return True
+    return False
 
 
 @rule("OSIM305", "reference-case", severity=ERROR, mends="safe")

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from osimlite.document.lexical import reads_as
 from osimlite.document.notes import Note
+from osimlite.document.source import Source
+from osimlite.lint.diagnostic import Fix, Severity
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
-from osimlite.lint.fixes import renamed, without_element
-from osimlite.lint.old_tags import Successor, successor
+from osimlite.lint.fixes import as_comment, renamed, without_element
+from osimlite.lint.old_tags import Successor, is_comment, reason_unused, successor
 from osimlite.lint.rules.classes import part_for, set_for, wrapper_for
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import a, called, shown
 from osimlite.schema.base import Object
-from osimlite.schema.fields import Held
+from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.model import CURRENT_VERSION, Model
 from osimlite.schema.registry import classes_mentioning
 from osimlite.schema.specs import FieldSpec, field_specs
-from osimlite.text import listed, nearest
+from osimlite.text import counted, listed, nearest
 
 
 @rule("OSIM101", "unknown-tag", severity=ERROR, mends="both")
@@ -30,7 +35,9 @@ def unknown_tag(subject: Subject, found: FindingSink) -> None:
     OpenSim drops such an element without a word and keeps the default. A misspelt `<stiffness>` of a contact is 0, and
     the motion becomes NaN; a misspelt `<ForceSet>` is a model without forces. A setup may hold what older versions
     understood: that is a warning, or an information if the element is empty or switches off what is off anyway. A
-    misspelt element that says what the default is anyway is a warning too.
+    misspelt element that says what the default is anyway is a warning too, as is one that no version has read, such as
+    the `<location>` of a MovingPathPoint. A `<Comment>` is an information. Of several elements of one tag the first is
+    reported, with the number of the others.
 
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
@@ -39,35 +46,92 @@ def unknown_tag(subject: Subject, found: FindingSink) -> None:
       </Body>
     ```
     """
+    groups: dict[tuple[object, ...], list[_Unknown]] = {}
     for note, owner in subject.notes_of("unknown-tag"):
         if wrapper_for(note, owner) is not None or part_for(note, owner) is not None:
             continue
-        specs = field_specs(type(owner))
         old = successor(type(owner), note.word)
         if old is not None:
             _report_old(subject, found, note, owner, old)
             continue
-        suggestion = nearest(_FORMER.get(note.word, note.word), specs, cutoff=70)
-        message = f"{called(owner)} has no property <{note.word}>; OpenSim ignores it"
-        if suggestion is not None:
-            kept = _default_of(specs[suggestion])
-            message += f" and keeps the default of {suggestion}{kept}" if suggestion not in _present(owner) else ""
-        elif note.value is not None:
-            message += f": {a(note.word)} cannot stand in {a(type(owner).tag)}"
-            home = set_for(note.value)
-            message += f"; it belongs in the {home}" if home and isinstance(owner, Model) else ""
-        else:
-            homes = _homes(note.word, type(owner))
-            message += f": it is a property of {listed(homes, most=3)}" if homes else ""
-        same = suggestion is not None and suggestion.lower() == note.word.lower()
-        free = suggestion is not None and suggestion not in _present(owner)
-        fix = renamed(subject.source, note.number, suggestion, safe=same) if free else None
-        severity = ERROR
-        if not free and subject.model is None:
-            severity = INFO if _asks_for_nothing(subject, note.number) else WARNING
-        elif free and suggestion is not None and _is_default(subject, note.number, specs[suggestion]):
-            severity = WARNING
-        found(message, owner, number=note.number, suggestion=suggestion, fix=fix, severity=severity)
+        item = _describe_unknown(subject, note, owner)
+        groups.setdefault((note.word, item.suggestion, item.severity), []).append(item)
+    for first, *others in groups.values():
+        more = f"; {counted(len(others), 'more element')} <{first.note.word}>" if others else ""
+        found(
+            first.message + more,
+            first.owner,
+            number=first.note.number,
+            suggestion=first.suggestion,
+            fix=_merge_fixes([first.fix, *(other.fix for other in others)]),
+            severity=first.severity,
+        )
+
+
+class _Unknown(NamedTuple):
+    """An element that is no property, and what is reported of it."""
+
+    note: Note
+    owner: Object
+    message: str
+    severity: Severity
+    suggestion: str | None = None
+    fix: Fix | None = None
+
+
+def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _Unknown:
+    """Return what is reported of an element that no version has as a property."""
+    reason = reason_unused(type(owner), note.word)
+    if reason is not None:
+        fix = without_element(subject.source, note.number)
+        message = f"<{note.word}> of {called(owner)} is read by no version of OpenSim: {reason}; delete it"
+        return _Unknown(note, owner, message, WARNING, fix=fix)
+    if is_comment(note.word):
+        message = f"<{note.word}> in {called(owner)} is a comment written as an element; OpenSim ignores it"
+        return _Unknown(note, owner, message, INFO, fix=as_comment(subject.source, note.number))
+    specs = field_specs(type(owner))
+    suggestion = nearest(_FORMER.get(note.word, note.word), specs, cutoff=70)
+    if suggestion is not None and not _can_hold(subject, note, specs[suggestion]):
+        suggestion = None
+    message = f"{called(owner)} has no property <{note.word}>; OpenSim ignores it"
+    if suggestion is not None:
+        kept = _default_of(specs[suggestion])
+        message += f" and keeps the default of {suggestion}{kept}" if suggestion not in _present(owner) else ""
+    elif note.value is not None:
+        message += f": {a(note.word)} cannot stand in {a(type(owner).tag)}"
+        home = set_for(note.value)
+        message += f"; it belongs in the {home}" if home and isinstance(owner, Model) else ""
+    else:
+        homes = _homes(note.word, type(owner))
+        message += f": it is a property of {listed(homes, most=3)}" if homes else ""
+    same = suggestion is not None and suggestion.lower() == note.word.lower()
+    free = suggestion is not None and suggestion not in _present(owner)
+    fix = renamed(subject.source, note.number, suggestion, safe=same) if free else None
+    severity = ERROR
+    if not free and subject.model is None:
+        severity = INFO if _asks_for_nothing(subject, note.number) else WARNING
+    elif free and suggestion is not None and _is_default(subject, note.number, specs[suggestion]):
+        severity = WARNING
+    return _Unknown(note, owner, message, severity, suggestion, fix)
+
+
+def _can_hold(subject: Subject, note: Note, spec: FieldSpec) -> bool:
+    """Return whether the content of an element may stand in a property: text in a value, objects in a part."""
+    if subject.source is None:
+        return True
+    children = subject.source.children(note.number)
+    has_text = bool(_inside(subject, note.number).strip()) and not children
+    if isinstance(spec.kind, Held):
+        return not has_text
+    return not children
+
+
+def _merge_fixes(fixes: Sequence[Fix | None]) -> Fix | None:
+    """Return one fix that does what several do; None if one of them is missing."""
+    known = [fix for fix in fixes if fix is not None]
+    if len(known) < len(fixes) or not known:
+        return known[0] if len(fixes) == 1 and known else None
+    return Fix(tuple(edit for fix in known for edit in fix.edits), all(fix.safe for fix in known))
 
 
 def _inside(subject: Subject, number: int) -> str:
@@ -155,8 +219,9 @@ def duplicate_tag(subject: Subject, found: FindingSink) -> None:
 def element_in_value(subject: Subject, found: FindingSink) -> None:
     """A value has an element inside.
 
-    Reports elements inside a number, a switch, a text or a reference, and comments and CDATA sections in the middle of
-    one. A comment before or after it does no harm.
+    Reports elements inside a number, a switch, a text or a reference, and comments, instructions and CDATA sections in
+    the middle of one. A comment before or after it does no harm. A CDATA section must be all of a value, and have no
+    white space around a name or a number.
 
     OpenSim refuses to load the file.
 
@@ -168,8 +233,11 @@ def element_in_value(subject: Subject, found: FindingSink) -> None:
     for note, owner in subject.notes_of("child-in-value"):
         assert note.spec is not None
         if note.word == "!--":
+            what = _interrupting(subject, note.number)
+            if not what:
+                continue
             found(
-                f"there is a comment in the middle of {subject.titled(owner, note.spec)}: OpenSim refuses the file",
+                f"there is {what} in the middle of {subject.titled(owner, note.spec)}: OpenSim refuses the file",
                 owner,
                 number=note.number,
             )
@@ -181,16 +249,80 @@ def element_in_value(subject: Subject, found: FindingSink) -> None:
         )
     source = subject.source
     if source is not None and "<![CDATA[" in source.text:
-        for match in _CDATA.finditer(source.text):
-            if match[1].strip() or match[2].strip():
-                place = source.position(match.start() + 1 + len(match[1]), len("<![CDATA["))
-                found("a CDATA section is only a part of this value: OpenSim refuses the file", at=place)
+        for number in _holders_of_cdata(source):
+            _report_cdata(subject, source, number, found)
 
 
+def _interrupting(subject: Subject, number: int) -> str:
+    """Return what stands in the middle of a value; nothing if it is a CDATA section, which is reported apart."""
+    inside = _inside(subject, number)
+    if "<![CDATA[" in inside:
+        return ""
+    return "a comment" if "<!--" in inside else "a processing instruction"
+
+
+def _holders_of_cdata(source: Source) -> Iterator[int]:
+    """Yield the elements without children that hold a CDATA section."""
+    holders: set[int] = set()
+    starts = [span.start for span in source.spans]
+    place = source.text.find("<![CDATA[")
+    while place >= 0:
+        # The element that begins last before a section holds it, unless it ends before.
+        number = bisect_right(starts, place) - 1
+        if number >= 0 and place < source.spans[number].inner_end and not source.children(number):
+            holders.add(number)
+        place = source.text.find("<![CDATA[", place + 1)
+    yield from sorted(holders)
+
+
+def _report_cdata(subject: Subject, source: Source, number: int, report: FindingSink) -> None:
+    """Report a value that OpenSim does not read as it is meant, since it stands in a CDATA section."""
+    spec = _property_of(subject, source, number)
+    if spec is None:
+        return
+    span = source.spans[number]
+    inside = source.text[span.tag_end : span.inner_end]
+    texts = [part for part in _SECTIONS.split(inside) if part.strip()]
+    sections = _SECTION.findall(inside)
+    place = source.position(span.tag_end + inside.index("<![CDATA["), len("<![CDATA["))
+    if len(texts) + len(sections) > 1:
+        report("a CDATA section is only a part of this value: OpenSim refuses the file", at=place)
+    elif sections and not texts and sections[0] != sections[0].strip():
+        if isinstance(spec.kind, Reference) and spec.kind.shape != "list":
+            report(
+                "OpenSim takes the white space in this CDATA section for a part of the name, and refuses the model",
+                at=place,
+            )
+        elif isinstance(spec.kind, Value) and spec.kind.shape == "single" and spec.kind.scalar != "string":
+            report(
+                "OpenSim does not read a value with white space around it in a CDATA section: it keeps the default, "
+                "or refuses the model",
+                at=place,
+            )
+
+
+def _property_of(subject: Subject, source: Source, number: int) -> FieldSpec | None:
+    """Return the property that OpenSim reads from an element; None if it reads none."""
+    span = source.spans[number]
+    above = next((index for index in range(number - 1, -1, -1) if span.end <= source.spans[index].end), None)
+    if above is None:
+        return None
+    for items in subject.by_class.values():
+        for item in items:
+            if item._index == above:
+                specs = field_specs(type(item))
+                old = successor(type(item), span.tag)
+                tag = old.tag if old is not None and old.tag is not None else span.tag
+                spec = specs.get(tag)
+                return spec if spec is not None and not isinstance(spec.kind, Held) else None
+    return None
+
+
+_SECTION = re.compile(r"<!\[CDATA\[(.*?)\]\]>", re.DOTALL)
+_SECTIONS = re.compile(r"<!\[CDATA\[.*?\]\]>|<!--.*?-->|<\?.*?>", re.DOTALL)
 _OFF = re.compile(r"(?:\s+|(?:unassigned|false|-1(?:\.0*)?|0(?:\.0*)?)(?!\S))*+", re.IGNORECASE)
 _FORMER = {"enable_controller": "enabled"}
 """Names that properties had in early releases; OpenSim brings them up to date in no file."""
-_CDATA = re.compile(r">([^<>]*)<!\[CDATA\[.*?\]\]>([^<]*)(?=<)", re.DOTALL)
 
 
 def _present(owner: Object) -> set[str]:
