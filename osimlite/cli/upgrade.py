@@ -38,13 +38,14 @@ def upgrade(
     Example: osimlite upgrade gait2354.osim -o gait2354_v4.osim
     """
     from osimlite.document.printer import write
-    from osimlite.document.reader import read_document
+    from osimlite.document.reader import read_document, require_stated_version
     from osimlite.document.source import Source
     from osimlite.errors import OsimliteError
     from osimlite.schema.base import Object
     from osimlite.schema.model import CURRENT_VERSION
 
     style = options.checked_numbers(numbers)
+    require_stated_version(Source.of_file(file))
     document = read_document(Source.of_file(file), of=Object)
     mended = document.fault is not None
     if document.version >= CURRENT_VERSION and output is None and not mended:

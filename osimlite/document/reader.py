@@ -171,6 +171,10 @@ def document_of(source: Source, root: etree._Element, version: int, of: type[Obj
     """
     with collector_paused():
         if version < CURRENT_VERSION:
+            if root.tag != ROOT and has_newer_content(root, version):
+                # A model that OpenSim dumps has no <OpenSimDocument> around it, and no version.
+                wrapped = _upgraded(source, root, CURRENT_VERSION)
+                return _document(source, root, version, of, wrapped, is_known=True)
             return _document(source, root, version, of, _upgraded(source, root, version))
         document = None if _class_of(_first(root)) is None else _document(source, root, version, of, None)
         if document is None or any(note.kind in _NOT_KNOWN for note in document.notes):
@@ -182,8 +186,46 @@ def document_of(source: Source, root: etree._Element, version: int, of: type[Obj
     return document
 
 
+def has_newer_content(root: etree._Element, version: int) -> bool:
+    """Return whether a document has properties that came after a version."""
+    from osimlite.document.upgrade.newer import find_newer_content
+
+    return find_newer_content(root, version) is not None
+
+
+def require_stated_version(source: Source) -> None:
+    """Check that a document has nothing newer than the version that it states.
+
+    Raises:
+        DocumentError: it is no OpenSim document.
+        VersionError: it has something newer, so that its version is wrong.
+    """
+    from osimlite.document.upgrade.newer import find_newer_content
+
+    try:
+        root = parse(source)
+    except NotWellFormedError:
+        return
+    version = version_of(source, root)
+    newer = None if root.tag != ROOT or version >= CURRENT_VERSION else find_newer_content(root, version)
+    if newer is None:
+        return
+    number = [*root.iter(etree.Element)].index(newer.element)
+    message = (
+        f"the document says version {version} and holds <{as_written(newer.element.tag)}> in "
+        f"<{newer.parent}>, which came with version {newer.since}: one of them is wrong; write "
+        f'Version="{CURRENT_VERSION}" if the model is in the current format'
+    )
+    raise _unreadable(source, version, message, number)
+
+
 def _document(
-    source: Source, root: etree._Element, version: int, of: type[Object], upgraded: Upgraded | None
+    source: Source,
+    root: etree._Element,
+    version: int,
+    of: type[Object],
+    upgraded: Upgraded | None,
+    is_known: bool = False,
 ) -> Document:
     reader = ObjectReader(_included_by(source))
     top = _top_in(source, root if upgraded is None else upgraded.root, reader, of)
@@ -191,7 +233,7 @@ def _document(
     notes = reader.notes
     if upgraded is not None:
         notes = _renumber(source, top, notes, upgraded)
-        if isinstance(top, Model):
+        if isinstance(top, Model) and not is_known:
             _refuse_leftovers(source, version, notes)
     return Document(top, source, version, notes, upgraded)
 

@@ -5,6 +5,7 @@ Documents that are no models are compared property by property.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from itertools import zip_longest
 from typing import Any, NamedTuple
@@ -61,7 +62,7 @@ class _Comparison:
                 return
         if isinstance(old, Unknown) or isinstance(new, Unknown):
             if isinstance(old, Unknown) and isinstance(new, Unknown) and old.content != new.content:
-                yield Difference(path, way or "content", old.content, new.content)
+                yield from _compare_contents(path, way, old.content, new.content)
             return
         # Of components of two classes, what both have.
         for spec in [spec for tag, spec in field_specs(type(new)).items() if tag in field_specs(type(old))]:
@@ -114,6 +115,86 @@ class _Comparison:
             if target is not None:
                 return tree.path_of(target)
         return value if isinstance(value, str) else value.name
+
+
+_MARKUP = re.compile(
+    r"<!--.*?-->|<!\[CDATA\[(?P<section>.*?)\]\]>|<\?.*?\?>|"
+    r"<(?P<close>/?)(?P<tag>[^\s/<>!?]+)(?P<attributes>[^<>]*?)(?P<empty>/?)>",
+    re.DOTALL,
+)
+_ATTRIBUTE = re.compile(r"([^\s=]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
+
+
+def _compare_contents(path: str, way: str, old: str, new: str) -> Iterator[Difference]:
+    """Yield the values that differ in the XML of two objects of a class that nobody knows.
+
+    White space around values and between elements, comments, and the spelling of numbers do not
+    count.
+    """
+    before, after = _flatten_content(old), _flatten_content(new)
+    for place in dict.fromkeys([*before, *after]):
+        one, other = before.get(place), after.get(place)
+        if one is None or other is None or not _same_words(one, other):
+            what = f"{way}.{place}" if way and place else way or place or "content"
+            yield Difference(path, what, one, other)
+
+
+def _flatten_content(content: str) -> dict[str, str]:
+    """Return the texts of an XML fragment by the tags, and names, that lead to them below its first element."""
+    result: dict[str, str] = {}
+    levels: list[_Level] = []
+    end = 0
+    for match in _MARKUP.finditer(content):
+        if levels:
+            levels[-1].text += content[end : match.start()] + (match["section"] or "")
+        end = match.end()
+        if match["tag"] is None:
+            continue
+        if not match["close"]:
+            attributes = {name: value[1:-1] for name, value in _ATTRIBUTE.findall(match["attributes"])}
+            name = attributes.pop("name", "")
+            place = ""
+            if levels:
+                word = f"{match['tag']}[{name}]" if name else match["tag"]
+                above = levels[-1]
+                above.has_children = True
+                number = above.counts.get(word, 0)
+                above.counts[word] = number + 1
+                word += f"({number + 1})" if number else ""
+                place = f"{above.place}.{word}" if above.place else word
+            for attribute, value in attributes.items():
+                result[f"{place}@{attribute}"] = value
+            levels.append(_Level(place))
+        if (match["close"] or match["empty"]) and levels:
+            level = levels.pop()
+            if level.place and (level.text.strip() or not level.has_children):
+                result[level.place] = level.text.strip()
+    return result
+
+
+class _Level:
+    """An element of a fragment that is being read."""
+
+    def __init__(self, place: str) -> None:
+        self.place = place
+        self.text = ""
+        self.has_children = False
+        self.counts: dict[str, int] = {}
+
+
+def _same_words(one: str, other: str) -> bool:
+    """Return whether two texts have the same words, or numbers."""
+    words, others = one.split(), other.split()
+    return len(words) == len(others) and all(map(_same_word, words, others))
+
+
+def _same_word(one: str, other: str) -> bool:
+    if one == other:
+        return True
+    try:
+        return float(one) == float(other)
+    except ValueError:
+        return False
 
 
 def _listed(value: Any) -> list[Object]:

@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
-from osimlite.document.lexical import split
-from osimlite.document.upgrade.draft import Draft, plain, reals, step
+from osimlite.document.lexical import ABSENT, Unclean, converter
+from osimlite.document.upgrade.draft import Draft, plain, step
+from osimlite.schema.fields import Value
 
 _USUAL = {"min_control": 0.0, "max_control": 1.0}
+
+
+_READ = converter(Value("double"))
+
+
+def _read_beginning(text: str) -> float | None:
+    """Return the number that OpenSim reads of a text: the first of several, of a word its beginning."""
+    try:
+        return float(_READ(text))
+    except Unclean as unclean:
+        return None if unclean.value is ABSENT else float(unclean.value)
 
 
 @step(below=30513)
@@ -15,9 +27,8 @@ def control_bounds(draft: Draft) -> None:
         touched = False
         for tag, usual in _USUAL.items():
             bound = muscle.find(tag)
-            # OpenSim takes the first of several numbers.
-            values = None if bound is None else reals(" ".join(split(plain(bound))[:1]), 1)
-            if bound is not None and values is not None and abs(values[0] - usual) < 1e-14:
+            value = None if bound is None else _read_beginning(plain(bound))
+            if bound is not None and value is not None and abs(value - usual) < 1e-14:
                 draft.remove(bound)
                 touched = True
         if touched:

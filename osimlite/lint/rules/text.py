@@ -178,14 +178,26 @@ def document_version(subject: Subject, found: FindingSink) -> None:
         if isinstance(fault, VersionError):
             wanted = None if fault.version is not None else str(CURRENT_VERSION)
             found(fault.message, number=0, attribute="Version", suggestion=wanted)
-    if subject.version is not None and subject.version < _OLDEST_FOR_OPENSIM:
+    spans = subject.source.spans
+    has_root = bool(spans) and spans[0].tag != "Model"
+    late = ""
+    if subject.version is not None and subject.version < _SOCKETS:
+        late = _late_socket(subject.source)
+    if not has_root and late:
         found(
-            f"version {subject.version} is too old for OpenSim 4.6, which refuses it; `osimlite upgrade` writes the "
-            "model in the current format",
+            f"the <Model> does not stand in an <OpenSimDocument>: OpenSim takes it for version {subject.version} and "
+            f'refuses it; put it into <OpenSimDocument Version="{CURRENT_VERSION}">, as `osimlite upgrade` does',
+            number=0,
+        )
+        return
+    if subject.version is not None and subject.version < _OLDEST_FOR_OPENSIM:
+        advice = "; `osimlite upgrade` writes the model in the current format" if not late else ""
+        found(
+            f"version {subject.version} is too old for OpenSim 4.6, which refuses it{advice}",
             number=0,
             attribute="Version",
         )
-    if subject.version is not None and subject.version < _SOCKETS and (late := _late_socket(subject.source)):
+    if late:
         found(
             f"the document says version {subject.version} and holds {late}, which came later: OpenSim reads it by "
             "the rules of the old format and does not find it",
