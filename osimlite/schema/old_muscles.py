@@ -60,7 +60,12 @@ class Thelen2003Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
 class Schutte1993Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     """The muscle of Schutte et al. (1993)."""
 
-    facts = Facts(zero={NAN: "optimal_fiber_length tendon_slack_length"})
+    # Its velocity follows from `time_scale`: any max_contraction_velocity gives the same motion.
+    facts = Facts(
+        domains={"max_contraction_velocity": ""},
+        zero={NAN: "optimal_fiber_length tendon_slack_length"},
+        mujoco={"vmax": "", "fvmax": "", "rise": "", "fall": ""},
+    )
 
     time_scale: Annotated[float, real(domain="> 0")] = 0.1
     """Time (s) that the rates of activation and fiber length are divided by."""
@@ -87,7 +92,12 @@ class Schutte1993Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
 class Delp1990Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     """The muscle of Delp et al. (1990), with a mass between fiber and tendon."""
 
-    facts = Facts(states="activation fiber_length fiber_velocity")
+    # Its velocity is a state, whose rate follows from `time_scale` and `mass`.
+    facts = Facts(
+        states="activation fiber_length fiber_velocity",
+        domains={"max_contraction_velocity": ""},
+        mujoco={"vmax": "", "fvmax": "", "rise": "", "fall": ""},
+    )
 
     time_scale: Annotated[float, real(domain="> 0", legacy=True)] = 0.1
     """Time (s) that the rates of the states are divided by."""

@@ -21,8 +21,11 @@ from numpy.typing import NDArray
 
 from osimlite._require import require
 from osimlite.errors import OsimliteError
+from osimlite.forces.old_muscles import schutte_velocity
+from osimlite.multibody.schema_functions import numeric
 from osimlite.multibody.spatial import Array
 from osimlite.schema.muscles import Muscle
+from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated, Schutte1993Muscle_Deprecated
 from osimlite.schema.states import states_of
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.draft import Draft, Unsayable, add, tidy
@@ -103,7 +106,8 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
     own = Curves(force.tendon_slack_length, force.optimal_fiber_length * cos, force.max_isometric_force * cos)
     if not (own.tendon + own.fiber > own.tendon and own.force > 0.0 and own.tendon >= 0.0):
         raise Unsayable("its lengths or its force are not positive")
-    vmax, fvmax = _asked(force, "vmax", 0.0) / cos**2, _asked(force, "fvmax", FVMAX)
+    rates = _read_rates(force)
+    vmax, fvmax = rates.vmax / cos**2, rates.fvmax
     if not min(vmax, fvmax) > LEAST_RATE:
         raise Unsayable("its greatest velocity, or what it holds while it lengthens, is not positive")
     fits = draft.options.fit == "force"
@@ -114,7 +118,7 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
         raise Unsayable(f"its tension cannot be computed: {error.message}") from error
     curves = _fitted(own, spread[0], tensions, free=fits)
     name, limits = draft.name("actuator", path), (max(force.min_control, 0.0), min(force.max_control, 1.0))
-    rise, fall = _asked(force, "rise", 0.0), _asked(force, "fall", 0.0)
+    rise, fall = rates.rise, rates.fall
     lags = rise > 0.0 and fall > 0.0 and "activation" in states_of(force)
     gain, bias = curves.numbers(vmax, fvmax)
     add(
@@ -140,7 +144,9 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
         path,
         f"a {type(force).__name__}: an elastic tendon, fibers at a changing angle, curves that are no parabolas",
         "a muscle of MuJoCo's, "
-        + ("fitted to its isometric force" if fits else "with its own fiber and tendon lengths"),
+        + ("fitted to its isometric force" if fits else "with its own fiber and tendon lengths")
+        + rates.note
+        + ("" if lags else "; without activation dynamics: it has its full force at once"),
         f"actuator {name}",
         {"isometric force": Error.of(off, "Fmax")} if len(off) else {},
     )
@@ -150,6 +156,56 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
 def _counts(tensions: Array, own: Curves) -> NDArray[np.bool_]:
     """Which tensions (A, L) are compared."""
     return np.nan_to_num(tensions, nan=np.inf) < MOST * own.force
+
+
+class Rates(NamedTuple):
+    """What MuJoCo asks of a muscle in time."""
+
+    vmax: float  # greatest shortening velocity, optimal fiber lengths per second
+    fvmax: float  # force of lengthening fibers, as a part of the isometric one
+    rise: float  # time constant of rising activation, s
+    fall: float  # time constant of falling activation, s
+    note: str = ""  # what is said of them beside the muscle
+
+
+RISE_TO_63_PERCENT, FALL_TO_37_PERCENT = 1.052, 0.715
+"""Times, over MuJoCo's time constants, in which full excitation raises an activation from 0 to 1 - 1/e, and none lets
+it fall from 1 to 1/e: the integrals of (0.5 + 1.5 a) / (1 - a) and of 1 / (a (0.5 + 1.5 a))."""
+
+
+def _read_rates(force: Muscle) -> Rates:
+    """Return the greatest velocity and the time constants of a muscle, by the law of its class."""
+    if not isinstance(force, Schutte1993Muscle_Deprecated | Delp1990Muscle_Deprecated):
+        vmax, fvmax = _asked(force, "vmax", 0.0), _asked(force, "fvmax", FVMAX)
+        return Rates(vmax, fvmax, _asked(force, "rise", 0.0), _asked(force, "fall", 0.0))
+    time = force.time_scale
+    if not time > 0.0:
+        return Rates(0.0, FVMAX, 0.0, 0.0)
+    if isinstance(force, Schutte1993Muscle_Deprecated):
+        vmax = -schutte_velocity(1.0, 1.0, 0.0, force.damping) if force.damping > 0.0 else 0.0
+        fvmax = FVMAX
+    else:
+        vmax, fvmax = _ends_of_velocity_curve(force)
+    quick, slow = force.activation1 + force.activation2, force.activation2
+    rise = time / quick / RISE_TO_63_PERCENT if quick > 0.0 else 0.0
+    fall = time / slow / FALL_TO_37_PERCENT if slow > 0.0 else 0.0
+    note = (
+        "; velocity from its time_scale, activation with MuJoCo's time constants, which change with activation: "
+        "as fast up to 63 % and down to 37 % as its own"
+    )
+    return Rates(vmax / time, fvmax, rise, fall, note)
+
+
+def _ends_of_velocity_curve(force: Delp1990Muscle_Deprecated) -> tuple[float, float]:
+    """Return the normalised velocity at which the force ends, and the greatest force, of a curve of Delp's muscle."""
+    try:
+        curve = numeric(force.force_velocity_curve, 1, "the force_velocity_curve")
+        velocities = np.linspace(-2.0, 2.0, 401).tolist()
+        factors = [curve.evaluate((velocity,))[0] for velocity in velocities]
+    except OsimliteError:
+        return 0.0, FVMAX
+    idle = [velocity for velocity, factor in zip(velocities, factors, strict=True) if velocity < 0.0 and factor <= 0.0]
+    return -max(idle, default=-1.0), max(max(factors), 1.0)
 
 
 def _asked(force: Muscle, name: str, default: float) -> float:
