@@ -63,7 +63,9 @@ class SmoothSphereHalfSpaceForce(Force):
     """Contact of one ball with one half-space by the Hunt-Crossley law, made smooth for optimisation."""
 
     facts = Facts(
-        outputs="half_space_force:SpatialVec sphere_force:SpatialVec", outside={NAN: "stiffness constant_contact_force"}
+        outputs="half_space_force:SpatialVec sphere_force:SpatialVec",
+        outside={NAN: "stiffness constant_contact_force"},
+        zero={NAN: "hunt_crossley_smoothing"},
     )
 
     socket_sphere: ContactSphereSocket = ""

@@ -1,9 +1,10 @@
 """Functions of time, of coordinates, or of whatever their owner says."""
 
+from collections.abc import Iterator
 from typing import Annotated
 
 from osimlite.schema.base import Object, none
-from osimlite.schema.facts import Facts
+from osimlite.schema.facts import Contradiction, Facts
 from osimlite.schema.fields import (
     LegacyMany,
     LegacyOptional,
@@ -132,6 +133,14 @@ class StepFunction(Function):
     """Value before the step."""
     end_value: Annotated[float, real(legacy=True)] = 1.0
     """Value after the step."""
+
+    def contradictions(self) -> Iterator[Contradiction]:
+        """Its change takes some time, forwards or backwards."""
+        if self.transition_start_time == self.transition_end_time:
+            yield (
+                "transition_end_time",
+                f"its transition starts and ends at {self.transition_end_time:.6g}",
+            )
 
 
 class ExpressionBasedFunction(Function):

@@ -78,6 +78,9 @@ class Blankevoort1991Ligament(ForceProducer):
 
     facts = Facts(
         outputs="damping_force length lengthening_speed spring_force strain strain_rate total_force",
+        domains={"slack_length": "> 0"},
+        refused="slack_length linear_stiffness transition_strain damping_coefficient",
+        zero={NAN: "slack_length"},
         scales={"slack_length": PATH},
     )
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import combinations
 from typing import Any
 
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.rules.references import broken_references
+from osimlite.lint.skeleton import base_of
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Component, Object, Unknown
@@ -14,13 +16,17 @@ from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.forces import Force
 from osimlite.schema.specs import defaults, reference_specs
 from osimlite.schema.tree import Use
+from osimlite.text import listed
 
 
 @rule("OSIM321", "contact-without-partner", severity=WARNING)
 def contact_without_partner(subject: Subject, found: FindingSink) -> None:
-    """A contact force has fewer than two surfaces.
+    """A contact force has no two surfaces that can meet.
 
-    Reports contact forces that list no contact geometry, or only one, over all their parameter sets together.
+    Reports contact forces that list no contact geometry, or only one, over all their parameter sets together; and those
+    of whose surfaces no two can meet: all are on one body, or of shapes between which OpenSim computes no contact. A
+    HuntCrossleyForce acts between spheres, ellipsoids, and these and a half-space; an ElasticFoundationForce between a
+    mesh and a mesh, a sphere or a half-space.
 
     Such a force never acts, and OpenSim does not mention it.
 
@@ -33,13 +39,51 @@ def contact_without_partner(subject: Subject, found: FindingSink) -> None:
     """
     for force, holders, uses in _contact_lists(subject):
         if len(uses) > 1:
-            continue
-        listed_one = f"one surface, '{uses[0].text}'" if uses else "no contact geometry"
-        message = f"{called(force)} lists {listed_one}: it never acts"
+            reason = _reason_for_no_contact(subject, force, uses)
+            if not reason:
+                continue
+            message = f"{called(force)} lists {reason}: it never acts"
+        else:
+            listed_one = f"one surface, '{uses[0].text}'" if uses else "no contact geometry"
+            message = f"{called(force)} lists {listed_one}: it never acts"
         if holders:
             found(message, holders[0], tag="geometry")
         else:
             found(message, force)
+
+
+_ROUND = frozenset(("ContactSphere", "ContactEllipsoid"))
+_BESIDE_MESH = frozenset(("ContactMesh", "ContactSphere", "ContactHalfSpace"))
+
+
+def _can_meet(force: str, first: str, second: str) -> bool:
+    """Return whether OpenSim 4.6 computes contact between two shapes (measured, all pairs)."""
+    shapes = {first, second}
+    if force == "ElasticFoundationForce":
+        return "ContactMesh" in shapes and shapes <= _BESIDE_MESH
+    return not shapes.isdisjoint(_ROUND) and shapes <= _ROUND | {"ContactHalfSpace"}
+
+
+def _reason_for_no_contact(subject: Subject, force: Component, uses: list[Use]) -> str:
+    """Return why no two of the surfaces of a force can meet; empty if some can, or it is not known."""
+    kind = type(force).__name__
+    if kind not in ("HuntCrossleyForce", "ElasticFoundationForce"):
+        return ""
+    surfaces = [subject.resolution(use).target for use in uses]
+    known = [surface for surface in surfaces if isinstance(surface, ContactGeometry)]
+    bases = [base_of(subject, subject.target_of(surface, "socket_frame")) for surface in known]
+    if len(known) != len(surfaces) or any(base is None for base in bases):
+        return ""
+    pairs = [*combinations(zip(known, bases, strict=True), 2)]
+    if all(first[1] is second[1] for first, second in pairs):
+        return f"surfaces of {called(bases[0])} alone" if bases[0] is not None else ""
+    if any(
+        first[1] is not second[1] and _can_meet(kind, type(first[0]).__name__, type(second[0]).__name__)
+        for first, second in pairs
+    ):
+        return ""
+    shapes = listed([f"{type(surface).__name__} '{surface.name}'" for surface in known], most=3)
+    return f"{shapes}, between which OpenSim computes no contact"
 
 
 @rule("OSIM322", "contact-listed-twice", severity=ERROR)

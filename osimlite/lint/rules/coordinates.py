@@ -6,6 +6,7 @@ import math
 
 from osimlite.document.lexical import shortest
 from osimlite.lint.config import Threshold
+from osimlite.lint.constants import constant_value
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
@@ -15,6 +16,9 @@ from osimlite.schema.joints import Joint
 
 ANGLE = Threshold("largest-angle", 10 * math.pi, "rad", "a coordinate that turns further is taken to be in degrees")
 UNBOUNDED = Threshold("unbounded-angle", 1000.0, "rad", "a bound of a range from which on it stands for none")
+_ASSEMBLY_ACCURACY = 1e-10
+"""Difference from the default value (rad or m) up to which OpenSim 4.6 takes a locked coordinate."""
+
 ORIENTATION = Threshold("largest-orientation", 2 * math.pi, "rad", "a larger angle of a frame is in degrees")
 
 
@@ -77,6 +81,40 @@ def default_outside_range(subject: Subject, found: FindingSink) -> None:
                 coordinate,
                 tag="default_value",
                 severity=ERROR if coordinate.clamped else None,
+            )
+
+
+@rule("OSIM515", "locked-and-prescribed", severity=ERROR)
+def locked_and_prescribed(subject: Subject, report: FindingSink) -> None:
+    """A coordinate is both locked and prescribed.
+
+    Reports such coordinates, unless the function is a constant that equals the default value.
+
+    The lock and the function contradict each other. OpenSim refuses the model, or its integrator
+    stops as soon as the function leaves the default value. Unlock the coordinate, or set
+    `prescribed` to false.
+
+    ```xml
+      <Coordinate name="knee_angle">
+    -     <locked>true</locked>
+          <prescribed>true</prescribed>
+          <prescribed_function>
+              <Sine> <amplitude>-0.5</amplitude> <omega>6</omega> </Sine>
+          </prescribed_function>
+      </Coordinate>
+    ```
+    """
+    for coordinate in subject.each(Coordinate):
+        function = coordinate.prescribed_function
+        if not (coordinate.locked and coordinate.prescribed) or function is None:
+            continue
+        value = constant_value(function)
+        if value is None or abs(value - coordinate.default_value) > _ASSEMBLY_ACCURACY:
+            report(
+                f"{called(coordinate)} is locked and prescribed: OpenSim refuses the model, or "
+                "stops as soon as the function leaves the default value",
+                coordinate,
+                tag="locked",
             )
 
 

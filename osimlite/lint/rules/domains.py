@@ -15,7 +15,7 @@ from osimlite.lint.words import quantity, shown
 from osimlite.schema.base import Object
 from osimlite.schema.facts import REFUSED
 from osimlite.schema.fields import Value, domain_test
-from osimlite.schema.specs import FieldSpec, value_specs
+from osimlite.schema.specs import FieldSpec, lineage, value_specs
 from osimlite.text import listed, nearest
 
 
@@ -26,8 +26,9 @@ def not_finite(subject: Subject, found: FindingSink) -> None:
     Reports NaN in any number, and infinity except in bounds (ranges, smallest and largest controls), where it is
     a way to say that there is none.
 
-    OpenSim accepts it in silence, and everything that is computed with the number becomes NaN: the simulation runs to
-    its end without a message and without a result.
+    OpenSim accepts a single number or a vector in silence, and everything that is computed with it becomes NaN: the
+    simulation runs to its end without a message and without a result. It refuses to load a file with such a number in a
+    list, as the points of a function are. In what is only drawn, and in bounds, it is a warning: the motion stays.
 
     ```xml
     - <gravity>0 NaN 0</gravity>
@@ -45,16 +46,26 @@ def not_finite(subject: Subject, found: FindingSink) -> None:
             if math.isnan(number) or (math.isinf(number) and not _bound(item, spec))
         ]
         if bad:
-            refused = spec.tag == "gravity" or (spec.tag == "mass" and math.isnan(bad[0]))
-            fate = "OpenSim refuses the model" if refused else _NAN_FATE
-            if spec.tag in ("min_control", "max_control"):
-                fate = "what takes it as a bound fails"
+            fate = _fate_of_nan(item, spec, bad[0])
             found(
                 f"{subject.titled(item, spec)} is {shown(value)}: {fate}",
                 item,
                 tag=spec.tag,
                 word=_word_of(subject, item, spec, bad[0]),
+                severity=WARNING if fate in (_DRAWN_FATE, _BOUND_FATE) else None,
             )
+
+
+def _fate_of_nan(item: Object, spec: FieldSpec, number: float) -> str:
+    """Return what OpenSim 4.6 does with NaN or infinity in a property (measured)."""
+    assert isinstance(spec.kind, Value)
+    if spec.kind.legacy and spec.kind.shape == "list":
+        return "OpenSim refuses to load the file"
+    if spec.tag == "gravity" or (spec.tag == "mass" and not number > 0.0):
+        return "OpenSim refuses the model"
+    if not _DRAWN.isdisjoint(lineage(type(item))):
+        return _DRAWN_FATE
+    return _BOUND_FATE if _bound(item, spec) else _NAN_FATE
 
 
 @rule("OSIM206", "impossible-value", severity=ERROR)
@@ -158,6 +169,10 @@ class Verdict(NamedTuple):
 
 
 _NAN_FATE = "what is computed with it becomes NaN, without a message"
+_DRAWN_FATE = "it cannot be drawn"
+_BOUND_FATE = "what takes it as a bound fails"
+_DRAWN = {"Geometry", "Appearance", "SurfaceProperties", "ModelDisplayHints", "ModelVisualPreferences"}
+"""Classes of what is only drawn."""
 
 
 _Outside = tuple[Object, FieldSpec, Any, Verdict]

@@ -21,10 +21,11 @@ def missing_mesh(subject: Subject, found: FindingSink) -> None:
     """A mesh file is not there.
 
     Looks for the file of each mesh where OpenSim does: beside the model, in the folder `Geometry` beside it, and in
-    the folders that the configuration names. A file of the same name in other letter case is pointed out.
+    the folders that the configuration names. A file of the same name in other letter case is pointed out, and one that
+    is found with / in the place of a backslash.
 
     OpenSim draws nothing for such a mesh. A contact mesh that is missing makes it refuse the model. A name in the wrong
-    case is found on Windows and macOS and missing on Linux.
+    case is found on Windows and macOS and missing on Linux; one with a backslash is found on Windows alone.
 
     ```xml
       <Body name="thigh"> <attached_geometry>
@@ -57,6 +58,17 @@ def missing_mesh(subject: Subject, found: FindingSink) -> None:
             message = f"'{name}' of {called(item)} is a folder, a device or a link to nothing, and no file"
         if twin is not None:
             message = f"the file '{name}' of {called(item)} is called '{twin}': other systems do not find it"
+        elif "\\" in name:
+            plain = name.replace("\\", "/")
+            twin = plain if any(folders.has(place, plain) for place in places) else None
+            other = None if twin is not None else folders.in_other_case(places, plain)
+            if other is not None:
+                twin = f"{plain.rpartition('/')[0]}/{other}"
+            if twin is not None:
+                message = (
+                    f"the file '{name}' of {called(item)} is there as '{twin}': only Windows reads a backslash so, and "
+                    "other systems do not find it"
+                )
         found(message, item, tag=tag, suggestion=twin, severity=severity)
 
 

@@ -20,7 +20,10 @@ from osimlite.schema.functions import (
     MultivariatePolynomialFunction,
     PiecewiseConstantFunction,
     PiecewiseLinearFunction,
+    PolynomialFunction,
     SimmSpline,
+    Sine,
+    StepFunction,
 )
 from osimlite.text import counted
 
@@ -106,8 +109,8 @@ def unequal_points(subject: Subject, found: FindingSink) -> None:
 def too_few_points(subject: Subject, found: FindingSink) -> None:
     """A function has too few points.
 
-    Reports a SimmSpline of fewer than two points, a GCVSpline of fewer than twice its half order, and piecewise
-    functions without any.
+    Reports a SimmSpline of fewer than two points, a GCVSpline of fewer than twice its half order or without a half
+    order, and piecewise functions without any.
 
     A SimmSpline is then NaN everywhere, a GCVSpline is refused, and a piecewise function returns what is in memory.
 
@@ -124,7 +127,14 @@ def too_few_points(subject: Subject, found: FindingSink) -> None:
             least = 2
         elif isinstance(function, GCVSpline):
             least = 2 * function.half_order
-        if len(function.x) < least:
+        if isinstance(function, GCVSpline) and function.half_order < 1:
+            given = str(function.half_order) if "half_order" in function.model_fields_set else "not given"
+            found(
+                f"half_order of {subject.called_with(function)} is {given}: OpenSim refuses it; 2 is a cubic spline",
+                function,
+                tag="half_order",
+            )
+        elif len(function.x) < least:
             fate = "OpenSim refuses it" if isinstance(function, GCVSpline) else "it has no value"
             given = counted(len(function.x), "point")
             found(f"{subject.called_with(function)} has {given} and needs {least}: {fate}", function, tag="x")
@@ -136,10 +146,10 @@ def coefficient_count(subject: Subject, found: FindingSink) -> None:
 
     Reports linear functions without coefficients (an error), polynomials of several variables with another number than
     their dimension and order ask for (an error), and linear functions on the axis of a joint or of a coordinate
-    coupler that have more or fewer than the coordinates there and a constant.
+    coupler that have fewer (an error) or more than the coordinates there and a constant.
 
-    OpenSim crashes on an empty list, and refuses a polynomial. Otherwise it takes the first for the weights, the last
-    for the constant, and drops what is between: the joint moves by another law than was written.
+    OpenSim crashes on an empty list, and refuses a polynomial. Where the constant is missing it reads beyond the end of
+    the list. Of too many it takes the first for the weights, the next for the constant, and ignores the rest.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -172,12 +182,50 @@ def coefficient_count(subject: Subject, found: FindingSink) -> None:
     for holder, names, function in _linear(subject):
         given, wanted = len(function.coefficients), names + 1
         if given and given != wanted:
+            fate = "OpenSim reads beyond the end of the list" if given < wanted else "OpenSim ignores the rest"
             found(
                 f"the LinearFunction of {called(holder)} has {counted(given, 'coefficient')} for "
-                f"{counted(names, 'coordinate')}: {wanted} belong there",
+                f"{counted(names, 'coordinate')}: {wanted} belong there; {fate}",
                 function,
                 tag="coefficients",
+                severity=ERROR if given < wanted else None,
             )
+
+
+@rule("OSIM607", "function-of-several", severity=ERROR)
+def function_of_several(subject: Subject, report: FindingSink) -> None:
+    """A function of one variable stands on several coordinates.
+
+    Reports splines, piecewise functions, polynomials, sines and steps on an axis of a CustomJoint, or in a
+    CoordinateCouplerConstraint, that names more than one coordinate; and MultivariatePolynomialFunctions whose
+    `dimension` is not the number of the coordinates.
+
+    OpenSim gives no message. It takes values and derivatives of different coordinates, so that the motion is that of
+    neither. A LinearFunction takes any number of coordinates, a MultivariatePolynomialFunction those of its dimension.
+
+    ```xml
+      <CoordinateCouplerConstraint name="follow">
+          <coupled_coordinates_function>
+              <SimmSpline> <x>-1 0 1</x> <y>0 -0.1 -0.3</y> </SimmSpline>
+          </coupled_coordinates_function>
+    -     <independent_coordinate_names>hip_flexion pelvis_rz</independent_coordinate_names>
+    +     <independent_coordinate_names>hip_flexion</independent_coordinate_names>
+          <dependent_coordinate_name>knee_angle</dependent_coordinate_name>
+      </CoordinateCouplerConstraint>
+    ```
+    """
+    for holder, count, held in _on_coordinates(subject):
+        function = held
+        while isinstance(function, MultiplierFunction):
+            function = function.function
+        wanted = function.dimension if isinstance(function, MultivariatePolynomialFunction) else 1
+        if not isinstance(function, (*_OF_ONE, MultivariatePolynomialFunction)) or count == wanted or not count:
+            continue
+        report(
+            f"the {type(function).tag} of {called(holder)} is a function of {counted(wanted, 'variable')} and stands "
+            f"on {counted(count, 'coordinate')}: OpenSim computes what is meant for neither",
+            holder,
+        )
 
 
 _NEEDED: Final = {
@@ -238,16 +286,31 @@ def missing_function(subject: Subject, found: FindingSink) -> None:
             )
 
 
-def _linear(subject: Subject) -> Iterator[tuple[Object, int, LinearFunction]]:
-    """The linear functions of several variables: what they belong to, how many variables, and the function."""
-    holders: list[tuple[Object, int, Function | None]] = []
+_OF_ONE: Final = (
+    SimmSpline,
+    GCVSpline,
+    PiecewiseLinearFunction,
+    PiecewiseConstantFunction,
+    PolynomialFunction,
+    Sine,
+    StepFunction,
+)
+
+
+def _on_coordinates(subject: Subject) -> Iterator[tuple[Object, int, Function | None]]:
+    """Yield the functions of coordinates: what they belong to, the number of coordinates, the function."""
     for joint in subject.named("CustomJoint"):
         # An axis without coordinates takes any function that needs none.
-        holders += [(axis, len(axis.coordinates), axis.function) for axis in axes_of(joint) if axis.coordinates]
+        for axis in axes_of(joint):
+            if axis.coordinates:
+                yield axis, len(axis.coordinates), axis.function
     for coupler in subject.named("CoordinateCouplerConstraint"):
-        names = coupler.independent_coordinate_names
-        holders.append((coupler, len(names), coupler.coupled_coordinates_function))
-    for holder, count, held in holders:
+        yield coupler, len(coupler.independent_coordinate_names), coupler.coupled_coordinates_function
+
+
+def _linear(subject: Subject) -> Iterator[tuple[Object, int, LinearFunction]]:
+    """The linear functions of several variables: what they belong to, how many variables, and the function."""
+    for holder, count, held in _on_coordinates(subject):
         function = held
         while isinstance(function, MultiplierFunction):
             function = function.function

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from osimlite.forces.vectors import dot
 from osimlite.lint.axes import coordinates_of
-from osimlite.lint.engine import WARNING, FindingSink, rule
+from osimlite.lint.engine import ERROR, FindingSink, rule
 from osimlite.lint.placement import turning_axes
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
@@ -14,7 +14,7 @@ _LOCKED = 1e-8
 """Sine of the angle between an axis and the plane of the others; below it OpenSim 4.6 computes NaN (measured)."""
 
 
-@rule("OSIM416", "gimbal-lock", severity=WARNING)
+@rule("OSIM416", "gimbal-lock", severity=ERROR)
 def gimbal_lock(subject: Subject, found: FindingSink) -> None:
     """Two of the three rotations of a joint are about one axis in the default pose.
 
@@ -22,8 +22,9 @@ def gimbal_lock(subject: Subject, found: FindingSink) -> None:
     lays the third axis on the first.
 
     The joint cannot turn about the direction that is lost, its mass matrix has no inverse there, and every acceleration
-    of the model is NaN, also where the coordinates are locked. Inverse kinematics goes on, but the two angles may take
-    any value. A default a thousandth away is enough; a BallJoint has no such pose.
+    of the model is NaN, or beyond 1e12 rad/s^2 where rounding leaves a little, also where the coordinates are locked.
+    Inverse kinematics goes on, but the two angles may take any value. A default a thousandth away is enough; a
+    BallJoint has no such pose.
 
     ```xml
       <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
@@ -51,8 +52,8 @@ def gimbal_lock(subject: Subject, found: FindingSink) -> None:
             if abs(dot(one, across)) < _LOCKED:
                 second = next(item for item in coordinates_of(joint) if item.name == turns[1][0])
                 found(
-                    f"{called(joint)} starts in gimbal lock: {first} and {third} turn about one axis, and every "
-                    "acceleration is NaN",
+                    f"{called(joint)} starts in gimbal lock: {first} and {third} turn about one axis, and "
+                    "accelerations are NaN or without bounds",
                     second,
                     tag="default_value",
                 )

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from math import pi, radians
 
 from osimlite.lint.config import Threshold
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.base import Object
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.joints import Joint
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint
+from osimlite.schema.states import motions_of
 from osimlite.schema.wrapping import WrapObject
 from osimlite.text import counted
 
@@ -103,7 +107,8 @@ def coincident_path_points(subject: Subject, found: FindingSink) -> None:
 def inverted_point_range(subject: Subject, found: FindingSink) -> None:
     """A conditional path point is never in the path.
 
-    Reports conditional points whose range ends before it begins, and those without any.
+    Reports conditional points whose range ends before it begins, or lies outside of the range of the coordinate, and
+    those without any. Where both ends in radians would lie in the range of the coordinate, the range is in degrees.
 
     The coordinate is never inside, so that the path always leaves the point out.
 
@@ -123,8 +128,39 @@ def inverted_point_range(subject: Subject, found: FindingSink) -> None:
                 point,
                 tag="range",
             )
-        elif "range" not in point.model_fields_set:
+        elif "range" in point.model_fields_set:
+            _report_unreachable(subject, found, point)
+        else:
             found(f"{called(point)} has no range: it counts only where the coordinate is exactly 0", point, tag="range")
+
+
+def _report_unreachable(subject: Subject, report: FindingSink, point: ConditionalPathPoint) -> None:
+    """Report the range of a conditional point that no value of its coordinate reaches."""
+    coordinate = subject.target_of(point, "socket_coordinate")
+    if not isinstance(coordinate, Coordinate) or "range" not in coordinate.model_fields_set:
+        return
+    low, high = sorted(coordinate.range)
+    first, last = point.range
+    joint = subject.tree.parent_of(coordinate)
+    motion = motions_of(joint).get(coordinate.name) if isinstance(joint, Joint) and joint.motion_types else None
+    turns = motion != "translational"
+    slack = 0.02 * (high - low) + 1e-5
+    meant = (radians(first), radians(last))
+    fits = turns and max(abs(first), abs(last)) > pi and low - slack <= meant[0] and meant[1] <= high + slack
+    never = last < low - 1e-5 or first > high + 1e-5
+    # A range in degrees may begin at 0 or end there, which is in the range in radians too.
+    if never or (fits and max(abs(first), abs(last)) > 4.0 * pi):
+        unit = "rad" if turns else "m"
+        verb = "lies outside of" if never else "goes far beyond"
+        report(
+            f"the range of {called(point)}, {quantity(first)} to {quantity(last, unit)}, "
+            f"{verb} that of '{coordinate.name}', {quantity(low)} to {quantity(high, unit)}"
+            + (": it never counts" if never else "")
+            + ("; in degrees?" if fits else ""),
+            point,
+            tag="range",
+            suggestion=f"{meant[0]:.6g} {meant[1]:.6g}" if fits else None,
+        )
 
 
 @rule("OSIM614", "unused-wrap-object", severity=INFO)

@@ -17,9 +17,11 @@ from osimlite.schema.base import Component, Object
 from osimlite.schema.contact import ContactGeometry, ContactHalfSpace, ContactSphere
 from osimlite.schema.fields import Value
 from osimlite.schema.frames import Body, PhysicalOffsetFrame, StationDefinedFrame
+from osimlite.schema.joints import Joint
 from osimlite.schema.markers import Station
 from osimlite.schema.specs import FieldSpec, value_specs
 from osimlite.schema.tree import is_a
+from osimlite.text import listed
 
 POINTS = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point")
 """Sockets of a frame laid through stations."""
@@ -32,7 +34,7 @@ def degenerate_frame(subject: Subject, found: FindingSink) -> None:
     Reports frames laid through stations of which two of the three that give the axes are in the same place, or which
     are fixed to different bodies; and offset frames that are fixed to themselves, or to each other in a circle.
 
-    OpenSim refuses the model; of a circle it never finds the end.
+    OpenSim refuses the model. It never comes to an end with several frames on each other to which a joint leads.
 
     ```xml
       <ComponentSet>
@@ -65,7 +67,7 @@ def degenerate_frame(subject: Subject, found: FindingSink) -> None:
         # The way ends on itself: what it passed since it was here first is the circle.
         circle = list(way.values())[list(way).index(id(here)) :] if id(here) in way else []
         for link in circle:
-            found(f"{called(link)} is fixed to itself: OpenSim never comes to an end", link, tag="socket_parent")
+            found(f"{called(link)} is fixed to {_fate_of_circle(subject, circle)}", link, tag="socket_parent")
     laid = list(subject.each(StationDefinedFrame))
     circles = _on_circles(subject, laid)
     for frame in laid:
@@ -99,6 +101,25 @@ def degenerate_frame(subject: Subject, found: FindingSink) -> None:
                     tag=POINTS[other],
                 )
                 break
+
+
+def _fate_of_circle(subject: Subject, circle: Sequence[PhysicalOffsetFrame]) -> str:
+    """Return what frames in a circle are fixed to, and what OpenSim 4.6 does (measured)."""
+    if len(circle) == 1:
+        return "itself: OpenSim refuses the model"
+    names = listed([f"'{frame.name}'" for frame in circle])
+    through = f"itself, through {names}"
+    members = {id(frame) for frame in circle}
+    for joint in subject.each(Joint):
+        for tag in ("socket_parent_frame", "socket_child_frame"):
+            frame = subject.target_of(joint, tag)
+            seen: set[int] = set()
+            while isinstance(frame, PhysicalOffsetFrame) and id(frame) not in seen:
+                if id(frame) in members:
+                    return f"{through}: OpenSim never comes to an end"
+                seen.add(id(frame))
+                frame = subject.target_of(frame, "socket_parent")
+    return f"{through}: OpenSim refuses the model"
 
 
 DEPTH = Threshold("contact-depth", 1e-3, "m", "surfaces may start this deep inside each other")
@@ -192,14 +213,14 @@ def _lengths(cls: type[Object]) -> tuple[FieldSpec, ...]:
     )
 
 
-@rule("OSIM415", "no-direction", severity=WARNING)
+@rule("OSIM415", "no-direction", severity=ERROR)
 def no_direction(subject: Subject, found: FindingSink) -> None:
     """A direction has no length.
 
-    Reports lines, axes and directions of constraints and actuators that are 0 0 0. It is an error for the line of a
-    PointOnLineConstraint, which is 0 0 0 if nobody gives it.
+    Reports lines, axes and directions of constraints and actuators that are 0 0 0. The line of a PointOnLineConstraint
+    is so if nobody gives it. Of an actuator with `appliesForce` false it is a warning.
 
-    An actuator pulls in no direction, whatever its force. Of a line without a direction OpenSim makes NaN.
+    OpenSim makes NaN of a direction without length, whatever the force: every acceleration is NaN, without a message.
 
     ```xml
       <PointActuator name="push">
@@ -215,13 +236,13 @@ def no_direction(subject: Subject, found: FindingSink) -> None:
     ):
         for item in subject.named(cls):
             if not any(getattr(item, tag)):
-                line = cls == "PointOnLineConstraint"
-                fate = "accelerations become NaN, without a message" if line else "it never acts"
+                is_off = not getattr(item, "appliesForce", True)
+                fate = "it does not act" if is_off else "accelerations become NaN, without a message"
                 found(
                     f"{subject.titled(item, type(item).field_specs()[tag])} is 0 0 0: {fate}",
                     item,
                     tag=tag,
-                    severity=ERROR if line else None,
+                    severity=WARNING if is_off else None,
                 )
 
 

@@ -79,10 +79,10 @@ def closed_loop(subject: Subject, found: FindingSink) -> None:
     -     <socket_parent_frame>/bodyset/pelvis</socket_parent_frame>
     -     <socket_child_frame>/bodyset/shank</socket_child_frame>
     - </WeldJoint>
-    + <WeldConstraint name="strut">
-    +     <socket_frame1>/bodyset/pelvis</socket_frame1>
-    +     <socket_frame2>/bodyset/shank</socket_frame2>
-    + </WeldConstraint>
+    + <ConstantDistanceConstraint name="strut">
+    +     <socket_body_1>/bodyset/pelvis</socket_body_1>
+    +     <socket_body_2>/bodyset/shank</socket_body_2> <constant_distance>0.5</constant_distance>
+    + </ConstantDistanceConstraint>
     ```
     """
     bones = skeleton(subject)
