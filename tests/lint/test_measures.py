@@ -49,7 +49,7 @@ def test_missing_packages_are_reported_in_every_format_and_are_no_finding(bare, 
     for name in ("full", "concise"):
         done = bare.call("validate", "--no-cache", "--format", name, jumping, folder=jumping.parent)
         assert (done.returncode, done.stderr) == (0, "")
-        assert done.stdout.endswith(f"Paths and muscles (OSIM63): {jumping}: {WHY}.\n")
+        assert done.stdout.endswith(f"Construction, paths and muscles (OSIM42, OSIM53, OSIM63): {jumping}: {WHY}.\n")
     texts = {}
     for name in ("json", "sarif", "github"):
         # A note is no finding, so that --fail-on info does not count it.
@@ -62,11 +62,11 @@ def test_missing_packages_are_reported_in_every_format_and_are_no_finding(bare, 
     assert (note["code"], note["name"], note["severity"], note["file"]) == (
         "OSIM63", "not-measured", "info", str(jumping),
     )  # fmt: skip
-    assert note["message"] == f"rules OSIM63 (paths and muscles) {WHY}"
+    assert note["message"] == f"rules OSIM42, OSIM53 and OSIM63 (construction, paths, muscles) {WHY}"
     (invocation,) = json.loads(texts["sarif"])["runs"][0]["invocations"]
     assert WHY in invocation["toolExecutionNotifications"][0]["message"]["text"]
     assert texts["github"].startswith("::notice title=not-measured::") and WHY in texts["github"]
-    done = bare.call("validate", "--no-cache", "--ignore", "OSIM63", jumping, folder=jumping.parent)
+    done = bare.call("validate", "--no-cache", "--ignore", "OSIM42,OSIM53,OSIM63", jumping, folder=jumping.parent)
     assert "measured" not in done.stdout
 
 

@@ -1,0 +1,207 @@
+"""Compare the verdicts of two versions of the linter with OpenSim's, on models with faults.
+
+    python benchmarks/verdicts.py --edits 1000 [--before FOLDER]     random edits of real models
+    python benchmarks/verdicts.py --pairs 2000 [--before FOLDER]     two random faults at once
+
+`--before` names the folder of another version of osimlite, whose verdicts stand beside those of this
+one. A verdict is *missed* if OpenSim 4.6 does not load or initialise the model, or computes NaN
+accelerations, and the linter has no new error; it is *false* if OpenSim loads and initialises the
+model and an error says that it does not. The models are those of `shared/corpus`.
+
+OpenSim runs each model in a child process. A model that it does not finish within the limit of
+seconds counts for neither side.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+SECONDS = 20
+LARGEST_BYTES = 400_000
+
+LINTER = """
+import json, sys
+from osimlite.lint import validate
+for line in sys.stdin:
+    try:
+        report = validate(line.rstrip("\\n"), ignore="OSIM63")
+        errors = [[item.code, item.message] for item in report.errors]
+    except Exception as error:
+        errors = [["TRACEBACK", f"{type(error).__name__}: {error}"]]
+    print(json.dumps(errors), flush=True)
+"""
+
+
+class Linter:
+    """One version of osimlite, in a process of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        environment = {**os.environ, "PYTHONPATH": str(folder)}
+        command = [sys.executable, "-W", "ignore", "-c", LINTER]
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=environment, cwd=folder)
+
+    def errors(self, path: Path) -> list[tuple[str, str]]:
+        """Return code and message of each error of a file."""
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._process.stdin.write(f"{path}\n")
+        self._process.stdin.flush()
+        return [(code, message) for code, message in json.loads(self._process.stdout.readline())]
+
+    def close(self) -> None:
+        """End the process."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait()
+
+
+def ask_opensim(path: Path) -> str:
+    """Return what OpenSim does with a file: "runs", "refuses", "NaN", or "hangs"."""
+    import opensim
+
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(SECONDS)
+        for stream in (1, 2):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+        verdict = "refuses"
+        try:
+            model = opensim.Model(str(path))
+            state = model.initSystem()
+            os.write(writer, b"initialised ")
+            model.realizeAcceleration(state)
+            finite = all(map(math.isfinite, state.getUDot().to_numpy()))
+            verdict = "runs" if finite else "NaN"
+        except RuntimeError:
+            verdict = "refuses"
+        os.write(writer, verdict.encode())
+        os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as pipe:
+        words = pipe.read().decode().split()
+    _, status = os.waitpid(child, 0)
+    if status & 127 == signal.SIGALRM:
+        return "hangs"
+    if not words or words == ["initialised"]:
+        return "refuses"
+    if words == ["initialised", "refuses"]:
+        # It initialises, and fails when it is asked for accelerations.
+        return "fails"
+    return words[-1]
+
+
+def read_models(shared: Path, folder: Path) -> list[Path]:
+    """Return copies of the models of the corpus that OpenSim runs, each in a folder with its files."""
+    import shutil
+
+    result = []
+    for source in sorted((shared / "corpus" / "models").glob("*/*.osim")):
+        if source.stat().st_size > LARGEST_BYTES:
+            continue
+        home = folder / source.parent.name
+        shutil.copytree(source.parent, home)
+        path = home / source.name
+        if ask_opensim(path) == "runs":
+            result.append(path)
+    return result
+
+
+def edit_once(text: str, draw: random.Random) -> tuple[str, str]:
+    """Return a text with one random edit, and what was done."""
+    from tests.oracle.structural_edits import Text, edits
+
+    edit = next(edits(Text(text), draw))
+    return edit.text, edit.what
+
+
+def main() -> None:
+    """Run the comparison and print the table."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--edits", type=int, default=0)
+    parser.add_argument("--pairs", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--before", type=Path)
+    parser.add_argument("--shared", type=Path, default=HERE.parents[1] / "shared")
+    parser.add_argument("--log", type=Path)
+    chosen = parser.parse_args()
+    sys.path.insert(0, str(HERE.parent))
+    import opensim
+
+    from tests.oracle.test_lint_structural_edits import ALWAYS, ELSE, REFUSES
+
+    opensim.Logger.setLevelString("Off")
+    opensim.Logger.removeFileSink()
+    linters = {"now": Linter(HERE.parent)}
+    if chosen.before is not None:
+        linters["before"] = Linter(chosen.before)
+
+    def claims(code: str, message: str) -> bool:
+        known = ALWAYS.match(code) is not None or REFUSES.search(message) is not None
+        return known and ELSE.search(message) is None
+
+    draw = random.Random(chosen.seed)
+    log = [] if chosen.log is None else [chosen.log.open("w", encoding="utf-8")]
+    with tempfile.TemporaryDirectory() as place:
+        models = read_models(chosen.shared, Path(place))
+        texts = {path: path.read_text(encoding="utf-8", errors="replace") for path in models}
+        known = {name: {path: Counter(linter.errors(path)) for path in models} for name, linter in linters.items()}
+        counts: Counter[Any] = Counter()
+        for number in range(chosen.edits + chosen.pairs):
+            path = draw.choice(models)
+            text, what = edit_once(texts[path], draw)
+            if number >= chosen.edits:
+                try:
+                    text, more = edit_once(text, draw)
+                except (IndexError, KeyError, ValueError):
+                    # The first edit has left nothing to edit.
+                    continue
+                what = f"{what}; {more}"
+            edited = path.with_name("edited.osim")
+            edited.write_text(text, encoding="utf-8")
+            verdict = ask_opensim(edited)
+            counts["edits"] += 1
+            counts[verdict] += 1
+            if verdict == "hangs":
+                continue
+            for name, linter in linters.items():
+                left = known[name][path].copy()
+                new = []
+                for error in linter.errors(edited):
+                    if left[error] > 0:
+                        left[error] -= 1
+                    else:
+                        new.append(error)
+                wrong = ""
+                if any(code == "TRACEBACK" for code, _ in new):
+                    wrong = "traceback"
+                elif verdict != "runs" and not new:
+                    wrong = f"missed ({verdict})"
+                elif verdict in ("runs", "NaN", "fails") and any(claims(*error) for error in new):
+                    wrong = "false"
+                if wrong:
+                    counts[name, wrong] += 1
+                    for file in log:
+                        lines = [f"{name} {wrong} {path.parent.name}: {what}", *map(str, new[:2])]
+                        file.write("\n    ".join(lines) + "\n")
+                        file.flush()
+    for key, count in counts.items():
+        print(f"{key if isinstance(key, str) else ' '.join(key):30} {count:6}")
+    for linter in linters.values():
+        linter.close()
+
+
+if __name__ == "__main__":
+    main()

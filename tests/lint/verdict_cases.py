@@ -1,0 +1,462 @@
+"""Small models with one fault each, what the linter must say, and what OpenSim 4.6 does (measured).
+
+A model is a pendulum `a` on the pin `q` and a slider `s` that carries `b`; a case adds elements to it.
+`tests/oracle/test_lint_verdicts.py` asks OpenSim for the same.
+"""
+
+from __future__ import annotations
+
+from html import escape
+from typing import NamedTuple
+
+RUNS, FAILS = "runs", "fails"
+"""What OpenSim does: it computes finite accelerations, or refuses the model, or computes NaN."""
+
+
+class Case(NamedTuple):
+    """A model and the verdict on it."""
+
+    name: str
+    text: str
+    code: str  # of the finding that must be there; empty if no error may be
+    verdict: str  # of OpenSim
+
+
+def small_model(
+    *,
+    forces: str = "",
+    coordinate: str = "",
+    constraints: str = "",
+    controllers: str = "",
+    bodies: str = "",
+    joints: str = "",
+    geometry: str = "",
+    children: str = "",
+    extra: str = "",
+) -> str:
+    """Return the text of the pendulum with more elements in its sets."""
+    return f"""<?xml version="1.0"?><OpenSimDocument Version="40600"><Model name="m">
+<BodySet name="bodyset"><objects>
+<Body name="a"><mass>1</mass><inertia>0.1 0.1 0.1 0 0 0</inertia>{children}</Body>
+<Body name="b"><mass>1</mass><inertia>0.1 0.1 0.1 0 0 0</inertia></Body>{bodies}
+</objects></BodySet><JointSet name="jointset"><objects>
+<PinJoint name="j"><socket_parent_frame>/ground</socket_parent_frame>
+<socket_child_frame>c</socket_child_frame><coordinates><Coordinate name="q">
+<default_value>0.3</default_value><range>-2 2</range>{coordinate}</Coordinate></coordinates>
+<frames><PhysicalOffsetFrame name="c"><socket_parent>/bodyset/a</socket_parent>
+<translation>0 0.3 0</translation></PhysicalOffsetFrame></frames></PinJoint>
+<SliderJoint name="k"><socket_parent_frame>/bodyset/a</socket_parent_frame>
+<socket_child_frame>/bodyset/b</socket_child_frame><coordinates><Coordinate name="s">
+<default_value>0.2</default_value><range>-2 2</range></Coordinate></coordinates></SliderJoint>
+{joints}</objects></JointSet>
+<ConstraintSet name="constraintset"><objects>{constraints}</objects></ConstraintSet>
+<ForceSet name="forceset"><objects>{forces}</objects></ForceSet>
+<ContactGeometrySet name="contactgeometryset"><objects>{geometry}</objects></ContactGeometrySet>
+<ControllerSet name="controllerset"><objects>{controllers}</objects></ControllerSet>
+{extra}</Model></OpenSimDocument>
+"""
+
+
+def path_of(*points: tuple[str, str]) -> str:
+    """Return the GeometryPath through points, each a frame and a location."""
+    inside = "".join(
+        f'<PathPoint name="p{number}"><socket_parent_frame>{frame}</socket_parent_frame>'
+        f"<location>{place}</location></PathPoint>"
+        for number, (frame, place) in enumerate(points)
+    )
+    return f'<GeometryPath name="path"><PathPointSet><objects>{inside}</objects></PathPointSet></GeometryPath>'
+
+
+def prescribed(function: str, more: str = "") -> str:
+    """Return the text of a model whose coordinate `q` follows a function."""
+    inside = f"<prescribed_function>{function}</prescribed_function>"
+    return small_model(coordinate=f"{more}<prescribed>true</prescribed>{inside}")
+
+
+def _tag(name: str, **properties: object) -> str:
+    inside = "".join(f"<{key}>{value}</{key}>" for key, value in properties.items())
+    return f'<{name} name="f">{inside}</{name}>'
+
+
+GROUND, A, B = "/ground", "/bodyset/a", "/bodyset/b"
+LOCKED = "<locked>true</locked>"
+
+
+def expressions() -> list[Case]:
+    """Return formulas that OpenSim reads and others that it does not."""
+    cases = []
+    for formula, code in (
+        ("-2*q-0.1*qdot", ""),
+        ("q;x=2", ""),
+        ("x;x=2", ""),
+        ("step(q)-q^2", ""),
+        ("-2*x", "OSIM606"),
+        ("q**2", "OSIM606"),
+        ("power(q,2)", "OSIM606"),
+        ("min(q)", "OSIM606"),
+        ("2*(q", "OSIM606"),
+        ("q-pi", "OSIM606"),
+        ("+q", "OSIM606"),
+        ("", "OSIM606"),
+        ("1/(q-0.3)", "OSIM532"),
+        ("log(q-0.3)", "OSIM532"),
+        ("sqrt(q-1)", "OSIM532"),
+    ):
+        force = _tag("ExpressionBasedCoordinateForce", coordinate="q", expression=escape(formula))
+        text = small_model(forces=force)
+        cases.append(Case(f"force on q: {formula}", text, code, FAILS if code else RUNS))
+    for variable, code in (("d", ""), ("ddot", ""), ("x", "OSIM606"), ("q", "OSIM606")):
+        force = _tag(
+            "ExpressionBasedPointToPointForce",
+            body1=GROUND,
+            body2=A,
+            point1="1 0 0",
+            expression=variable,
+        )
+        text = small_model(forces=force)
+        cases.append(Case(f"between points: {variable}", text, code, FAILS if code else RUNS))
+    for variable, code in (("theta_x", ""), ("delta_z", ""), ("theta_w", "OSIM606")):
+        force = _tag(
+            "ExpressionBasedBushingForce",
+            socket_frame1=GROUND,
+            socket_frame2=A,
+            Mx_expression=variable,
+        )
+        text = small_model(forces=force)
+        cases.append(Case(f"bushing: {variable}", text, code, FAILS if code else RUNS))
+    for variables, formula, code in (("x", "x", ""), ("x", "y", "OSIM606"), ("x", "sin(x", "OSIM606")):
+        function = (
+            f"<ExpressionBasedFunction><variables>{variables}</variables>"
+            f"<expression>{formula}</expression></ExpressionBasedFunction>"
+        )
+        verdict = FAILS if code else RUNS
+        cases.append(Case(f"function of {variables}: {formula}", prescribed(function), code, verdict))
+    return cases
+
+
+def constraints() -> list[Case]:
+    """Return constraints that a pose meets, and others that none does."""
+
+    def distance(first: str, second: str, place: str, size: float) -> str:
+        return _tag(
+            "ConstantDistanceConstraint",
+            socket_body_1=first,
+            socket_body_2=second,
+            location_body_2=place,
+            constant_distance=size,
+        )
+
+    def coupler(function: str, independent: str, dependent: str) -> str:
+        return _tag(
+            "CoordinateCouplerConstraint",
+            coupled_coordinates_function=f"<LinearFunction><coefficients>{function}</coefficients></LinearFunction>",
+            independent_coordinate_names=independent,
+            dependent_coordinate_name=dependent,
+        )
+
+    def weld(kind: str, **more: object) -> str:
+        return _tag(kind, **more)
+
+    table = (
+        ("a distance on one body that holds", distance(A, A, "0 0 1", 1), "", RUNS),
+        ("a distance on one body", distance(A, A, "0 0 1", 2), "OSIM422", FAILS),
+        ("a distance in millimetres", distance(GROUND, A, "0 0 0", 300), "OSIM422", FAILS),
+        (
+            "a point on one body",
+            weld("PointConstraint", socket_body_1=A, socket_body_2=A, location_body_1="1 0 0"),
+            "OSIM422",
+            FAILS,
+        ),
+        (
+            "a weld of a frame with its own body",
+            weld("WeldConstraint", socket_frame1=A, socket_frame2="/jointset/j/c"),
+            "OSIM422",
+            FAILS,
+        ),
+        ("a weld of a body with itself", weld("WeldConstraint", socket_frame1=A, socket_frame2=A), "", RUNS),
+        ("a coupler on itself that holds", coupler("1 0", "q", "q"), "", RUNS),
+        ("a coupler on itself", coupler("1 1", "q", "q"), "OSIM422", FAILS),
+        ("a coupler with a coefficient too many", coupler("1 0 5", "q", "s"), "OSIM604", RUNS),
+        ("a coupler without coordinates", coupler("1 0", "", "s"), "OSIM604", RUNS),
+        ("a distance of zero", distance(GROUND, A, "0 0 0", 0), "OSIM206", FAILS),
+    )
+    cases = [Case(name, small_model(constraints=text), code, verdict) for name, text, code, verdict in table]
+    locked = small_model(constraints=coupler("1 1", "s", "q"), coordinate=LOCKED).replace(
+        "<default_value>0.2", f"{LOCKED}<default_value>0.2"
+    )
+    cases.append(Case("a coupler of two locked coordinates", locked, "OSIM422", FAILS))
+    clamped = small_model(constraints=coupler("1 3", "s", "q"), coordinate="<clamped>true</clamped>").replace(
+        "<default_value>0.2", f"{LOCKED}<default_value>0.2"
+    )
+    cases.append(Case("a coupler beyond a clamp", clamped, "OSIM423", RUNS))
+    beyond = prescribed("<Constant><value>5</value></Constant>", "<clamped>true</clamped>")
+    cases.append(Case("a function beyond a clamp", beyond, "OSIM423", RUNS))
+    return cases
+
+
+def contradictions() -> list[Case]:
+    """Return properties that contradict each other, or their frames, each fine alone."""
+    cases = []
+    for name, function, code in (
+        ("equal constant", "<Constant><value>0.3</value></Constant>", ""),
+        ("equal line", "<LinearFunction><coefficients>0 0.3</coefficients></LinearFunction>", ""),
+        ("other constant", "<Constant><value>0.31</value></Constant>", "OSIM515"),
+        ("sine", "<Sine><amplitude>0.2</amplitude></Sine>", "OSIM515"),
+        ("slope", "<LinearFunction><coefficients>1 0.3</coefficients></LinearFunction>", "OSIM515"),
+    ):
+        verdict = FAILS if code else RUNS
+        cases.append(Case(f"locked and prescribed: {name}", prescribed(function, LOCKED), code, verdict))
+
+    def spring(first: str, second: str, one: str, two: str, **more: object) -> str:
+        sockets = {"socket_body1": first, "socket_body2": second, "point1": one, "point2": two}
+        return _tag("PointToPointSpring", **more, **sockets, stiffness=10, rest_length=0.1)
+
+    def between(kind: str, first: str, second: str, one: str, two: str, **more: object) -> str:
+        bodies = {"body1": first, "body2": second} if kind.startswith("Exp") else {"bodyA": first, "bodyB": second}
+        points = {"point1": one, "point2": two} if kind.startswith("Exp") else {"pointA": one, "pointB": two}
+        return _tag(kind, **bodies, **points, **more)
+
+    springy = {"resting_length": 0.1, "stiffness": 10, "dissipation": 0}
+
+    def band(*points: tuple[str, str], kind: str = "PathSpring", off: str = "") -> str:
+        inside = "".join(f"<{key}>{value}</{key}>" for key, value in springy.items() if kind == "PathSpring")
+        return f'<{kind} name="f">{off}{path_of(*points)}{inside}</{kind}>'
+
+    zero = "0 0 0"
+    table = (
+        ("a spring on one body", spring(A, A, zero, "1 0 0"), "OSIM542", FAILS),
+        ("a spring on ground", spring(GROUND, GROUND, zero, "1 0 0"), "OSIM542", FAILS),
+        ("a spring on a body and its frame", spring(A, "/jointset/j/c", zero, zero), "OSIM542", FAILS),
+        ("a spring of no length", spring(GROUND, A, zero, "0 0.3 0"), "OSIM541", FAILS),
+        ("a short spring", spring(GROUND, A, zero, "0 0.300000001 0"), "", RUNS),
+        (
+            "a spring of no length that is off",
+            spring(GROUND, A, zero, "0 0.3 0", appliesForce="false"),
+            "",
+            RUNS,
+        ),
+        (
+            "an actuator on one body",
+            between("PointToPointActuator", "a", "a", zero, "1 0 0"),
+            "",
+            RUNS,
+        ),
+        (
+            "an actuator on one point",
+            between("PointToPointActuator", "a", "a", zero, zero),
+            "OSIM541",
+            FAILS,
+        ),
+        (
+            "an expression on one point",
+            between("ExpressionBasedPointToPointForce", A, A, zero, zero, expression="d"),
+            "OSIM541",
+            FAILS,
+        ),
+        ("a path of no length", band((GROUND, zero), (A, "0 0.3 0")), "OSIM541", FAILS),
+        ("a piece of no length", band((GROUND, zero), (A, "0 0.3 0"), (A, zero)), "OSIM541", FAILS),
+        (
+            "a point twice on one body",
+            band((GROUND, "0 1 0"), (A, zero), (A, zero)),
+            "OSIM612",
+            RUNS,
+        ),
+        (
+            "a path of no length that is off",
+            band((GROUND, zero), (A, "0 0.3 0"), off="<appliesForce>false</appliesForce>"),
+            "",
+            RUNS,
+        ),
+        (
+            "an actuator without a direction",
+            _tag("PointActuator", body="a", direction=zero, optimal_force=1),
+            "OSIM415",
+            FAILS,
+        ),
+        (
+            "a torque without an axis",
+            _tag("TorqueActuator", bodyA="a", bodyB="ground", axis=zero, optimal_force=1),
+            "OSIM415",
+            FAILS,
+        ),
+        (
+            "a ligament without a length",
+            band((GROUND, "0 1 0"), (A, zero), kind="Blankevoort1991Ligament"),
+            "OSIM206",
+            FAILS,
+        ),
+    )
+    cases += [Case(name, small_model(forces=text), code, verdict) for name, text, code, verdict in table]
+    for value in ("-1", "0"):
+        force = (
+            f'<Blankevoort1991Ligament name="f">{path_of((GROUND, "0 1 0"), (A, zero))}'
+            f"<slack_length>{value}</slack_length></Blankevoort1991Ligament>"
+        )
+        cases.append(Case(f"a slack_length of {value}", small_model(forces=force), "OSIM206", FAILS))
+    return cases
+
+
+def functions() -> list[Case]:
+    """Return functions that OpenSim computes otherwise than one may expect, and others that it refuses."""
+    table = (
+        ("<SimmSpline><x>0 1 2</x><y>0 1 3 4</y></SimmSpline>", "OSIM602", RUNS),
+        ("<PiecewiseLinearFunction><x>1</x><y>0.3</y></PiecewiseLinearFunction>", "", RUNS),
+        ("<PiecewiseLinearFunction><x>-1 1 1 2</x><y>0 1 3 4</y></PiecewiseLinearFunction>", "", RUNS),
+        ("<GCVSpline><half_order>1</half_order><x>0 1 2</x><y>0 1 3</y></GCVSpline>", "", RUNS),
+        ("<GCVSpline><x>0 1 2</x><y>0 1 3</y></GCVSpline>", "OSIM603", FAILS),
+        ("<GCVSpline><half_order>2</half_order><x>0 1 2</x><y>0 1 3</y></GCVSpline>", "OSIM603", FAILS),
+        (
+            "<StepFunction><transition_start_time>1</transition_start_time>"
+            "<transition_end_time>0</transition_end_time></StepFunction>",
+            "",
+            RUNS,
+        ),
+        (
+            "<StepFunction><transition_start_time>1</transition_start_time>"
+            "<transition_end_time>1</transition_end_time></StepFunction>",
+            "OSIM209",
+            FAILS,
+        ),
+        ("<LinearFunction><coefficients>1 2 3</coefficients></LinearFunction>", "", RUNS),
+        ("<LinearFunction><coefficients>NaN 0</coefficients></LinearFunction>", "OSIM205", FAILS),
+        ("<SimmSpline><x>0 1</x><y>Inf 0</y></SimmSpline>", "OSIM205", FAILS),
+        ("<Constant><value>NaN</value></Constant>", "OSIM205", FAILS),
+    )
+    return [Case(function, prescribed(function), code, verdict) for function, code, verdict in table]
+
+
+def texts() -> list[Case]:
+    """Return values in CDATA sections, and instructions and comments beside values."""
+
+    def section(text: str) -> str:
+        return f"<![CDATA[{text}]]>"
+
+    spring = _tag("SpringGeneralizedForce", coordinate="q", stiffness=1)
+    plain = small_model(forces=spring)
+    table = (
+        ("a mass in a section", "<mass>1<", f"<mass>{section('1')}<", "", RUNS),
+        ("a mass in two sections", "<mass>1<", f"<mass>{section('1')}{section('')}<", "OSIM107", FAILS),
+        ("a mass before a section", "<mass>1<", f"<mass>1{section(' ')}<", "OSIM107", FAILS),
+        ("a mass with blanks in a section", "<mass>1<", f"<mass>{section(' 1 ')}<", "OSIM107", FAILS),
+        (
+            "a name with a blank in a section",
+            "<coordinate>q<",
+            f"<coordinate>{section(' q')}<",
+            "OSIM107",
+            FAILS,
+        ),
+        (
+            "a path with blanks in a section",
+            f"<socket_parent_frame>{A}<",
+            f"<socket_parent_frame>{section(f' {A} ')}<",
+            "OSIM107",
+            FAILS,
+        ),
+        (
+            "a path in a section",
+            f"<socket_parent_frame>{A}<",
+            f"<socket_parent_frame> {section(A)} <",
+            "",
+            RUNS,
+        ),
+        ("text that nobody reads", "<mass>1</mass>", f"<mass>1</mass>{section('x')}{section('y')}", "", RUNS),
+        ("an instruction in a list", "<range>-2 2<", "<range>-2<?x y?> 2<", "OSIM107", FAILS),
+        ("an instruction before a value", "<mass>1<", "<mass><?x y?>1<", "", RUNS),
+    )
+    return [Case(name, plain.replace(old, new, 1), code, verdict) for name, old, new, code, verdict in table]
+
+
+def frames() -> list[Case]:
+    """Return frames in circles."""
+
+    def frame(name: str, parent: str) -> str:
+        return f'<PhysicalOffsetFrame name="{name}"><socket_parent>{parent}</socket_parent></PhysicalOffsetFrame>'
+
+    def extra(*frames: str) -> str:
+        return f'<ComponentSet name="componentset"><objects>{"".join(frames)}</objects></ComponentSet>'
+
+    of_joint = small_model().replace(f"<socket_parent>{A}<", "<socket_parent>/jointset/j/c<")
+    return [
+        Case("a frame on itself", small_model(extra=extra(frame("x", "/componentset/x"))), "OSIM411", FAILS),
+        Case(
+            "two frames on each other",
+            small_model(extra=extra(frame("x", "/componentset/y"), frame("y", "/componentset/x"))),
+            "OSIM411",
+            FAILS,
+        ),
+        Case("a frame of a joint on itself", of_joint, "OSIM411", FAILS),
+    ]
+
+
+def poses() -> list[Case]:
+    """Return joints in poses where a direction is lost, and bodies without mass."""
+
+    def joint(kind: str, angle: str) -> str:
+        return small_model(
+            joints=f'<{kind} name="st"><socket_parent_frame>/ground</socket_parent_frame>'
+            f'<socket_child_frame>/bodyset/d</socket_child_frame><coordinates><Coordinate name="x"/>'
+            f'<Coordinate name="y"><default_value>{angle}</default_value></Coordinate>'
+            f'<Coordinate name="z"/></coordinates></{kind}>',
+            bodies='<Body name="d"><mass>1</mass><inertia>1 1 1 0 0 0</inertia></Body>',
+        )
+
+    between = small_model(
+        bodies='<Body name="d"><mass>0</mass><inertia>0 0 0 0 0 0</inertia></Body>'
+        '<Body name="e"><mass>1</mass><inertia>1 1 1 0 0 0</inertia></Body>',
+        joints="".join(
+            f'<PinJoint name="{name}"><socket_parent_frame>{parent}</socket_parent_frame>'
+            f"<socket_child_frame>/bodyset/{child}</socket_child_frame><coordinates>"
+            f'<Coordinate name="{name}q"/></coordinates></PinJoint>'
+            for name, parent, child in (("u", GROUND, "d"), ("v", "/bodyset/d", "e"))
+        ),
+    )
+    return [
+        Case("a gimbal at 90 degrees", joint("GimbalJoint", "1.5707963267948966"), "OSIM416", FAILS),
+        Case("a ball at 90 degrees", joint("BallJoint", "1.5707963267948966"), "", RUNS),
+        Case("a ball at -90 degrees", joint("BallJoint", "-1.5707963267948966"), "", RUNS),
+        Case("a gimbal at 1.57", joint("GimbalJoint", "1.57"), "", RUNS),
+        Case("a massless body between parallel axes", between, "OSIM424", FAILS),
+    ]
+
+
+def others() -> list[Case]:
+    """Return forces and controllers that stand in the wrong place."""
+    motor = '<CoordinateActuator name="m"><coordinate>q</coordinate></CoordinateActuator>'
+
+    def reflex(more: str = "") -> str:
+        return (
+            f'<ToyReflexController name="r">{more}<socket_actuators>/forceset/m</socket_actuators>'
+            "<gain>1</gain></ToyReflexController>"
+        )
+
+    disabled = "<enabled>false</enabled>"
+    return [
+        Case("an external force", small_model(forces='<ExternalForce name="e"/>'), "OSIM543", FAILS),
+        Case(
+            "an external force that is off",
+            small_model(forces='<ExternalForce name="e"><appliesForce>false</appliesForce></ExternalForce>'),
+            "OSIM543",
+            FAILS,
+        ),
+        Case("a reflex on a motor", small_model(forces=motor, controllers=reflex()), "OSIM544", FAILS),
+        Case("a reflex that is off", small_model(forces=motor, controllers=reflex(disabled)), "OSIM544", FAILS),
+        Case(
+            "a class after 4.6",
+            small_model(forces='<CoordinateLinearStopForce name="x"/>'),
+            "OSIM113",
+            FAILS,
+        ),
+    ]
+
+
+CASES = [
+    *expressions(),
+    *constraints(),
+    *contradictions(),
+    *functions(),
+    *texts(),
+    *frames(),
+    *poses(),
+    *others(),
+]
+"""All of them."""

@@ -1,0 +1,58 @@
+"""OpenSim says of the small models with one fault what their table says: it fails, or computes finite accelerations."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from tests.lint.verdict_cases import CASES, FAILS, RUNS
+
+pytestmark = pytest.mark.oracle
+opensim = pytest.importorskip("opensim")
+
+SECONDS = 60
+"""After this time a model that OpenSim never finishes counts as failed."""
+
+
+def verdict_of_opensim(path: Path) -> str:
+    """Return what OpenSim does with a file, asked in a process of its own."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(SECONDS)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+        verdict = FAILS
+        try:
+            model = opensim.Model(str(path))
+            state = model.initSystem()
+            model.realizeAcceleration(state)
+            if all(map(math.isfinite, state.getUDot().to_numpy())):
+                manager = opensim.Manager(model)
+                manager.initialize(state)
+                manager.integrate(0.01)
+                verdict = RUNS
+        except RuntimeError:
+            verdict = FAILS
+        os.write(writer, verdict.encode())
+        os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as pipe:
+        answer = pipe.read().decode()
+    os.waitpid(child, 0)
+    return answer or FAILS
+
+
+def test_opensim_does_what_the_table_says(tmp_path: Path):
+    path = tmp_path / "m.osim"
+    wrong = []
+    for case in CASES:
+        path.write_text(case.text, encoding="utf-8")
+        verdict = verdict_of_opensim(path)
+        if verdict != case.verdict:
+            wrong.append(f"{case.name}: OpenSim {verdict}")
+    assert not wrong, "\n".join(wrong)
