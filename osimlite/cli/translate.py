@@ -92,6 +92,8 @@ def translate(
         f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move; wrote "
         + listed([str(path) for path in written], most=4)
     )
+    if getattr(made, "start_note", ""):
+        say(made.start_note)
     if check is not None:
         from osimlite.cli._checking_mjcf import check as check_mjcf
 

@@ -127,6 +127,7 @@ class Draft:
     activations: dict[str, float] = field(default_factory=dict)  # at the start, of the actuators that have one, by name
     # values (rad, m) in the default pose of joints that a pass has added besides those of the robot, by name
     starts: dict[str, float] = field(default_factory=dict)
+    start_note: str = ""  # where simulations have to start, if that is not everywhere
     _names: dict[str, set[str | None]] = field(default_factory=dict)
     _meshes: dict[tuple[str, tuple[float, float, float]], str] = field(default_factory=dict)
 

@@ -57,6 +57,7 @@ class Mjcf:
         robot: the neutral robot that was written; its joints and links have MuJoCo's names.
         files: mesh files that the text names, and what the driver needs, by name relative to it.
         followers: what equality constraints make of joints, by name.
+        start_note: where simulations have to start, if that is not everywhere.
         leads: the joint that is a straight line of a coordinate, by the coordinate's place in the mechanism.
     """
 
@@ -67,6 +68,7 @@ class Mjcf:
     files: dict[str, bytes] = field(default_factory=dict)
     leads: Mapping[int, Lead] = field(default_factory=dict)
     followers: Mapping[str, Follower] = field(default_factory=dict)
+    start_note: str = ""
 
     def joint_values(self, q: Values) -> dict[str, float]:
         """Values (rad, m) of all joints by name at coordinate values `q`, exact where equalities are fitted."""
@@ -164,6 +166,7 @@ def to_mjcf(
         mesh_files.files | ({f"{name}.osim": to_text(model).encode()} if driver else {}),
         draft.leads,
         draft.followers,
+        draft.start_note,
     )
 
 
