@@ -194,7 +194,7 @@ def _compare_engines(tour: _Tour, compiled: Trajectory) -> None:
     from osimlite.simulation.run import Simulation
 
     motion = MOTIONS[0]
-    with tour.step(f"Simulate the {motion.model} by PyBullet: URDF, with contact forces of OpenSim's laws") as tell:
+    with tour.step("Simulate the walker by PyBullet too: URDF, custom contact forces") as tell:
         if find_spec("pybullet") is None:
             tell("PyBullet is not installed; to compare both engines, run: pip install 'osimlite[bullet]'")
             return
