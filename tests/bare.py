@@ -51,8 +51,6 @@ class BareEnvironment:
             folder: the working folder.
             code: Python that is run instead of the command.
         """
-        hidden = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")
-        environment = {name: value for name, value in os.environ.items() if name not in hidden}
         return subprocess.run(
             [self.python, "-c", code, *map(str, words)],
             capture_output=True,
@@ -61,8 +59,25 @@ class BareEnvironment:
             cwd=folder,
             check=False,
             timeout=120,
-            env={**environment, "COLUMNS": "200"},
+            env=_clean_environment(),
         )
+
+    def start(self, *words: object, folder: Path) -> subprocess.Popen[bytes]:
+        """Start the command `osimlite` of the environment in a folder; its input and output are pipes."""
+        return subprocess.Popen(
+            [self.python, "-c", CONSOLE_SCRIPT, *map(str, words)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            cwd=folder,
+            env=_clean_environment(),
+        )
+
+
+def _clean_environment() -> dict[str, str]:
+    """Return the environment variables without those that lead to packages outside of the environment."""
+    hidden = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")
+    return {name: value for name, value in os.environ.items() if name not in hidden} | {"COLUMNS": "200"}
 
 
 def find_distributions(extras: Sequence[str] = ()) -> Iterator[metadata.Distribution]:

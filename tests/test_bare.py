@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -27,3 +28,36 @@ def test_a_custom_joint_is_validated(bare: BareEnvironment, fixtures: Path, tmp_
     done = bare.call("validate", "--no-cache", "--format", "json", *models, folder=tmp_path)
     assert done.returncode == 1 and done.stderr == ""
     assert "OSIM413" in {finding["code"] for finding in json.loads(done.stdout)}
+
+
+def test_the_language_server_needs_its_own_extra_alone(fixtures: Path, tmp_path: Path) -> None:
+    """Editors get findings of a model with a custom joint from an environment with the extra `lsp`, without numpy."""
+    pytest.importorskip("pygls", reason="needs pygls (extra 'lsp')")
+    environment = BareEnvironment(tmp_path / "environment", ("lsp",))
+    text = (fixtures / "lint" / "OSIM413" / "fail-01-example.osim").read_text(encoding="utf-8")
+    uri = (tmp_path / "m.osim").as_uri()
+    document = {"uri": uri, "languageId": "xml", "version": 1, "text": text}
+    messages = [
+        {"id": 1, "method": "initialize", "params": {"processId": None, "rootUri": None, "capabilities": {}}},
+        {"method": "initialized", "params": {}},
+        {"method": "textDocument/didOpen", "params": {"textDocument": document}},
+    ]
+    server = environment.start("lsp", folder=tmp_path)
+    assert server.stdin is not None and server.stdout is not None
+    try:
+        for message in messages:
+            body = json.dumps({"jsonrpc": "2.0", **message}).encode()
+            server.stdin.write(b"Content-Length: %d\r\n\r\n%s" % (len(body), body))
+        server.stdin.flush()
+        received: dict[str, Any] = {}
+        while received.get("method") != "textDocument/publishDiagnostics":
+            header = server.stdout.readline()
+            assert header, "the server has ended"
+            if header.lower().startswith(b"content-length:"):
+                while server.stdout.readline().strip():
+                    pass
+                received = json.loads(server.stdout.read(int(header.split(b":")[1])))
+        assert "OSIM413" in {finding["code"] for finding in received["params"]["diagnostics"]}
+    finally:
+        server.kill()
+        server.communicate()
