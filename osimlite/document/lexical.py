@@ -159,6 +159,9 @@ def _one(read: Callable[[str], Any], optional: bool, legacy: bool) -> Callable[[
         if not words:
             if optional:
                 return None
+            if read is legacy_flag:
+                # OpenSim's first property system takes nothing for no.
+                raise Unclean("empty", "", False)
             raise Unclean("empty", "")
         if len(words) == 1:
             return read(words[0])

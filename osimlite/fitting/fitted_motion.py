@@ -35,6 +35,7 @@ class FittedMotion(Movement):
         model: what was fitted.
         sensors: names of the k sensors that were fitted.
         turns: of the sensors from where they were measured (t, k, 3), in ground, rad; NaN where one was not.
+        undetermined: names of coordinates that no measurement determines: they start at their default values.
     """
 
     mechanism: Mechanism
@@ -50,6 +51,7 @@ class FittedMotion(Movement):
     model: Model | None = field(default=None, repr=False)
     sensors: tuple[str, ...] = ()
     turns: Array = field(default_factory=lambda: np.empty((0, 0, 3)))
+    undetermined: tuple[str, ...] = ()
 
     @property
     def marker_errors(self) -> Array:
@@ -101,4 +103,6 @@ class FittedMotion(Movement):
             partly |= {name: round(part, 4) for name, part in zip(names, missing, strict=True) if part}
         result["partly_unseen"] = partly
         result["frames_unseen"], result["frames_unsettled"] = len(self.unseen), len(self.unsettled)
+        if self.undetermined:
+            result["undetermined"] = list(self.undetermined)
         return result

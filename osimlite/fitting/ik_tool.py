@@ -31,6 +31,8 @@ from osimlite.text import counted, did_you_mean, listed
 
 ABSURD = 1.0
 """A root mean square of the marker errors (m) that no pose of a person leaves."""
+MOST_NAMED = 8
+"""Coordinates that no measurement determines, which a message names."""
 UNNAMED = ("", "Unassigned")
 """What stands for no file."""
 
@@ -139,5 +141,10 @@ def told(motion: FittedMotion, advice: tuple[float, float] = ADVICE, of: str = "
     if result["frames_unseen"]:
         frames = counted(result["frames_unseen"], "frame")
         yield f"{frames} in which nothing with a weight was seen: the pose stays as it was before"
+    if motion.undetermined:
+        yield (
+            f"no measurement determines {listed(motion.undetermined, most=MOST_NAMED)}: they stay near the default "
+            "pose (OpenSim may end elsewhere, as in the middle of their ranges); lock them, or give them a task"
+        )
     if result["frames_unsettled"]:
         yield f"in {counted(result['frames_unsettled'], 'frame')} the best pose was not reached"

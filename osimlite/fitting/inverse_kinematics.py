@@ -19,6 +19,7 @@ from osimlite.fitting.orientation_data import OrientationData, Orientations
 from osimlite.fitting.pose_fit import PoseFit, Poses
 from osimlite.fitting.pose_layout import Goal, Marker, Sensor
 from osimlite.fitting.sensors import sensor_frames
+from osimlite.fitting.undetermined import find_undetermined
 from osimlite.multibody import build_mechanism
 from osimlite.multibody.constraints import Lock, Prescribed
 from osimlite.multibody.mechanism import Mechanism, StationPlacement
@@ -129,13 +130,9 @@ def fitted(
         mechanism = without_slides(mechanism)
     names, sensors = tuple(weights), sensor_frames(model, mechanism, sensed) if sensed else {}
     stations = marker_stations(model, mechanism)
-    fit = PoseFit(
-        mechanism,
-        [Marker(stations[name], weights[name]) for name in names],
-        [Sensor(frame, (sensed or {})[name]) for name, frame in sensors.items()],
-        goals,
-        constraints=constraints,
-    )
+    points = [Marker(stations[name], weights[name]) for name in names]
+    turning = [Sensor(frame, (sensed or {})[name]) for name, frame in sensors.items()]
+    fit = PoseFit(mechanism, points, turning, goals, constraints=constraints)
     measured, count = data.only(names), len(data.times)
     given = measured, turned.only([*sensors]), wanted
     poses: Poses = fit.fit(
@@ -143,6 +140,8 @@ def fitted(
         data.times,
         first_pose(mechanism, float(data.times[0]), constraints),
     )
+    seen = np.asarray(np.isfinite(measured).all(axis=2))
+    undetermined = find_undetermined(mechanism, poses.values, seen, points, turning, goals, constraints=constraints)
     return FittedMotion(
         mechanism,
         data.times,
@@ -157,6 +156,7 @@ def fitted(
         model,
         tuple(sensors),
         poses.turns,
+        undetermined,
     )
 
 

@@ -35,13 +35,13 @@ def poses_in(setup: Setup, motion: Table, time: float) -> dict[int, Pose]:
         name: value * turn if name in angles else value
         for name, value in zip(map(coordinate_of, motion.columns), motion.row_at(time)[1:], strict=False)
     }
-    return poses_at(_model_of(setup), values)
+    return poses_at(model_subject(setup), values)
 
 
 @once
 def marker_places(setup: Setup) -> dict[str, Vector]:
     """Where the markers of the model are in the default pose, in ground, m."""
-    model = _model_of(setup)
+    model = model_subject(setup)
     poses = poses_at(model, {})
     result: dict[str, Vector] = {}
     # What a set of markers adds has absolute paths.
@@ -54,6 +54,7 @@ def marker_places(setup: Setup) -> dict[str, Vector]:
 
 
 @once
-def _model_of(setup: Setup) -> Subject:
+def model_subject(setup: Setup) -> Subject:
+    """Return the model that the tool of a setup works on, as rules on models see it."""
     assert setup.tree is not None
     return Subject(setup.tree.model)

@@ -13,7 +13,7 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.files.recorded import RecordedMotion, exclude_forces
 from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.files.times import both_of
-from osimlite.text import did_you_mean
+from osimlite.text import did_you_mean, listed
 from osimlite.tools.evidence import Evidence, root_of
 from osimlite.tools.job import Job
 from osimlite.tools.joint_loads import loads_at_joints
@@ -26,6 +26,13 @@ def run(job: Job, outcome: Outcome) -> None:
     model = job.model()
     joints = _joints(job, model, outcome)
     recorded = RecordedMotion.read(build_mechanism(model, opensim_derivatives=True), job.needed("coordinates_file"))
+    by_path = [info.name for info in recorded.mechanism.coordinates if info.name in recorded.named_by_path]
+    if by_path:
+        outcome.warn(
+            "columns",
+            f"'{setup.coordinates_file}' names {listed(by_path)} by paths, which are understood here; OpenSim's "
+            "inverse dynamics takes the default values of these coordinates instead: its moments are other ones",
+        )
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:
         # OpenSim takes what its filter adds for part of the motion.

@@ -162,3 +162,26 @@ def test_tasks_of_coordinates_that_are_held(tmp_path: Path, held: str) -> None:
     change(folder / "leg.osim", *HELD[held])
     change(folder / "rra.xml", ("<final_time>0.3<", "<final_time>0.22<"))
     compare_runs(folder, "rra.xml")
+
+
+UNSEEN = {"in some frames": None, "in all frames": "ANK", "another in all": "KNE"}
+
+
+@pytest.mark.parametrize("which", [*UNSEEN])
+def test_marker_errors_where_a_marker_is_unseen(tmp_path: Path, which: str) -> None:
+    """Sums and largest errors are of the markers that are seen, means of all."""
+    folder = copy_lab("unseen", tmp_path)
+    if UNSEEN[which]:
+        lines = (folder / "walk.trc").read_text().splitlines()
+        place = 2 + 3 * [word for word in lines[3].split("\t")[2:] if word].index(UNSEEN[which])
+        for number, line in enumerate(lines[5:], 5):
+            cells = line.split("\t")
+            if len(cells) > place:
+                cells[place : place + 3] = [""] * 3
+                lines[number] = "\t".join(cells)
+        (folder / "walk.trc").write_text("\n".join(lines) + "\n")
+    ran, log = run_opensim(folder / "ik.xml", folder / "theirs")
+    assert ran, log
+    ours = osimlite.run(folder / "ik.xml", folder / "ours").tables["ik_ik_marker_errors.sto"]
+    assert np.isfinite(ours.rows).all()
+    assert difference(ours, folder / "theirs" / "ik_ik_marker_errors.sto") < 2e-7

@@ -154,3 +154,65 @@ def test_commands_without_setups_name_unknown_classes(tmp_path: Path) -> None:
     for done in (scaled, fitted):
         assert done.code == 0, done.err
         assert "LabContactForce" in done.err
+
+
+EMPTY = {
+    "a range": ("<time_range>0 0.05</time_range>", "<time_range />"),
+    "a number": ("<accuracy>1e-9</accuracy>", "<accuracy></accuracy>"),
+    "a switch": ("<report_errors>true</report_errors>", "<report_errors/>"),
+    "a word for a number": ("<accuracy>1e-9</accuracy>", "<accuracy>fine</accuracy>"),
+    "one time": ("<time_range>0 0.05</time_range>", "<time_range>0</time_range>"),
+}
+
+
+@pytest.mark.parametrize("what", [*EMPTY])
+def test_what_opensim_reads_as_a_default_is_run(tmp_path: Path, what: str) -> None:
+    folder = copy_lab("unseen", tmp_path)
+    change(folder / "ik.xml", EMPTY[what])
+    done = run("run", "ik.xml", "-o", "out", folder=folder)
+    assert done.code == 0, done.err
+    assert "keeps the default" in " ".join((done.out + done.err).split())
+    report = osimlite.validate(folder / "ik.xml")
+    codes = {finding.code: str(finding.severity) for finding in report.findings}
+    if what in ("a range", "a number", "a switch"):
+        assert codes["OSIM204"] == "warning"
+    else:
+        assert codes.get("OSIM201", codes.get("OSIM202")) == "error"
+
+
+@pytest.mark.parametrize("tag", ["initial_time", "output_precision"])
+def test_what_opensim_refuses_is_refused(tmp_path: Path, tag: str) -> None:
+    """Empty numbers of setups of older classes have no default."""
+    folder = copy_lab("energy", tmp_path)
+    text = (folder / "so.xml").read_text()
+    text = text.replace("<initial_time>0</initial_time>", "") if tag == "initial_time" else text
+    (folder / "so.xml").write_text(text.replace('<AnalyzeTool name="so">', f'<AnalyzeTool name="so"><{tag}/>'))
+    done = run("run", "so.xml", folder=folder)
+    assert done.code == 2
+    assert "OpenSim refuses to load the file" in done.err
+
+
+def test_an_empty_switch_of_an_older_class_is_off(tmp_path: Path) -> None:
+    folder = copy_lab("energy", tmp_path)
+    change(folder / "so.xml", ("<use_muscle_physiology>true</use_muscle_physiology>", "<use_muscle_physiology/>"))
+    first = osimlite.run(folder / "so.xml", folder / "one").tables["so_StaticOptimization_activation.sto"]
+    change(folder / "so.xml", ("<use_muscle_physiology/>", "<use_muscle_physiology>false</use_muscle_physiology>"))
+    second = osimlite.run(folder / "so.xml", folder / "two").tables["so_StaticOptimization_activation.sto"]
+    assert (first.rows == second.rows).all()
+
+
+def test_inverse_dynamics_of_columns_by_paths(tmp_path: Path) -> None:
+    """It computes the motion, and says that OpenSim would not."""
+    folder = copy_lab("paths", tmp_path)
+    done = run("run", "id.xml", "-o", "out", folder=folder)
+    assert done.code == 0
+    assert "OpenSim's inverse dynamics takes the default values" in " ".join(done.err.split())
+    with pytest.warns(DoubtfulWarning, match="by paths"):
+        by_path = next(iter(osimlite.run(folder / "id.xml", folder / "one").tables.values()))
+    text = (folder / "walk.mot").read_text()
+    for path in [word for word in text.split() if word.startswith("/jointset/")]:
+        text = text.replace(path, path.split("/")[-2])
+    (folder / "walk.mot").write_text(text)
+    result = osimlite.run(folder / "id.xml", folder / "two")
+    assert (next(iter(result.tables.values())).rows == by_path.rows).all()
+    assert "columns" not in dict(result.told)

@@ -18,9 +18,9 @@ from osimlite.text import listed
 def missing_column(setup: Setup, found: FindingSink) -> None:
     """A table of coordinates lacks coordinates of the model, or has none of them.
 
-    Compares the columns of a table of coordinates with the coordinates of the model: inverse dynamics takes plain names
-    alone, analyses take paths too. A task whose value is to come from a file needs its column there, and a table of
-    states one for every state of the model.
+    Compares the columns of a table of coordinates with the coordinates of the model: OpenSim's inverse dynamics
+    takes plain names alone, analyses and `osimlite run` take paths too. A task whose value is to come from a file
+    needs its column there, and a table of states one for every state of the model.
 
     OpenSim gives a coordinate without a column its default value, in analyses 0, without a word or with a line in the
     log: the motion is another one.
@@ -43,12 +43,14 @@ def missing_column(setup: Setup, found: FindingSink) -> None:
             for column in table.columns
         }
         lacking = sorted(name for name in names - columns if not setup.is_bound(name))
-        if not names & columns:
-            paths = any(column.startswith("/") for column in table.columns)
-            why = "; its columns are called by paths, which inverse dynamics does not understand" if paths else ""
+        if not names & columns and names & _named_by_paths(table):
             found(
-                f"'{getattr(item, tag)}' has no column of a coordinate of the model{why}", item, tag=tag, severity=ERROR
-            )
+                f"'{getattr(item, tag)}' names the coordinates by paths: OpenSim's inverse dynamics does not know "
+                "these, and computes the moments of the default pose; osimlite knows them",
+                item, tag=tag,
+            )  # fmt: skip
+        elif not names & columns:
+            found(f"'{getattr(item, tag)}' has no column of a coordinate of the model", item, tag=tag, severity=ERROR)
         elif lacking:
             found(
                 f"'{getattr(item, tag)}' has no column {listed(map(repr, lacking))}: OpenSim takes "
@@ -86,6 +88,12 @@ def missing_column(setup: Setup, found: FindingSink) -> None:
                         f"'{user.coordinate_file}' has no column '{task.name}': OpenSim refuses it",
                         task, attribute="name", severity=ERROR, suggestion=nearest_name(task.name, values.columns),
                     )  # fmt: skip
+
+
+def _named_by_paths(table: Table) -> set[str]:
+    """Return the names of coordinates whose values columns name by paths, as files of states of any age do."""
+    paths = [column.split("/") for column in table.columns if "/" in column]
+    return {parts[-2] if parts[-1] == "value" else parts[-1] for parts in paths}
 
 
 def _is_state(setup: Setup, column: str) -> bool:

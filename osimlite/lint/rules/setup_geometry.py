@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence, Set
+from itertools import islice
+from typing import Any
 
 from osimlite.lint.engine import WARNING, FindingSink, rule
 from osimlite.lint.posture import marker_places
 from osimlite.lint.rules.setup_markers import cells_of, marker_users, rows_between
 from osimlite.lint.setup import Setup, members
+from osimlite.lint.table import Table
 from osimlite.lint.words import called
 from osimlite.tables import METRES
 from osimlite.text import counted
 
 _LEAST, _MOST = 0.5, 2.0
 """Between these a factor that scales a body can be believed."""
+_FEW_ROWS, _MOST_ROWS = 3, 100
+"""How many of the rows that a table has ready must be of the times of a tool, and else how many are read."""
 _SIDES = (("R", "L"), ("r", "l"), ("Right", "Left"), ("right", "left"), ("RIGHT", "LEFT"))
 """How names tell sides."""
 
@@ -70,7 +75,8 @@ def swapped_sides(setup: Setup, found: FindingSink) -> None:
 
     Compares, for each two markers whose names differ by the side alone, the way from the left one to the right one with
     that of all other such pairs, in the data and in the model. A pair that is the other way round in four rows of five
-    is told. Pairs that are more than half a metre apart in the model are left out: arms may be crossed.
+    is reported. Pairs that are more than half a metre apart in the model are left out: arms may be crossed. Only rows
+    within the times of the tool count, and a marker at 0 0 0 is taken for one that was not seen.
 
     Inverse kinematics twists legs and pelvis to bring the markers as near as it can; the errors that it reports are
     spread over all markers.
@@ -99,9 +105,9 @@ def swapped_sides(setup: Setup, found: FindingSink) -> None:
         model = _agreement([_way(places[left], places[right]) for right, left in pairs])
         seen = [0] * len(pairs)
         turned = [0] * len(pairs)
-        for row in table.rows.samples:
+        for row in _rows_of_tool(user, table):
             row = row + [math.nan] * (2 + 3 * len(columns) - len(row))
-            ways = [_way(row[columns[left]], row[columns[right]]) for right, left in pairs]
+            ways = [_way(_seen(row[columns[left]]), _seen(row[columns[right]])) for right, left in pairs]
             for number, agreement in enumerate(_agreement(ways)):
                 seen[number] += agreement == agreement
                 turned[number] += agreement * model[number] < -0.3
@@ -113,6 +119,20 @@ def swapped_sides(setup: Setup, found: FindingSink) -> None:
                     f"'{left}' are the other way round than other markers of both sides: are they swapped?",
                     task or user, tag=None if task else "marker_file", attribute="name" if task else None,
                 )  # fmt: skip
+
+
+def _rows_of_tool(user: Any, table: Table) -> list[list[float]]:
+    """Some rows of markers within the times of a tool, from all over these times where that is known at no cost."""
+    span = tuple(getattr(user, "time_range", ()))
+    if len(span) != 2 or not span[0] <= span[1]:
+        return list(table.rows.samples)
+    within = [row for row in table.rows.samples if len(row) > 1 and span[0] <= row[1] <= span[1]]
+    return within if len(within) >= _FEW_ROWS else list(islice(rows_between(table, span), _MOST_ROWS))
+
+
+def _seen(point: Sequence[float]) -> Sequence[float]:
+    """The place of a marker; NaN at 0 0 0, where programs put what they did not see."""
+    return point if any(point) else (math.nan,) * 3
 
 
 def _fellow(name: str, names: Set[str]) -> str:

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from osimlite.forces.vectors import Vector, dot
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
-from osimlite.lint.placement import Pose
-from osimlite.lint.posture import poses_in
+from osimlite.lint.placement import Pose, on_base
+from osimlite.lint.posture import model_subject, poses_in
 from osimlite.lint.setup import Setup, members, motion_of
+from osimlite.lint.subject import once
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
+from osimlite.schema.tree import is_a
 from osimlite.text import listed
 
 _TIMES = 16
 """How many times of a motion are looked at."""
 _NEAR = 0.4
-"""How far from the origin of its body, m, a measured force may act. In the projects of
-docs/public-projects.md that measure gaits none is farther than 0.275."""
+"""How far from all that is known of its body, m, a measured force may act. In the projects of
+docs/public-projects.md that measure gaits none is farther than 0.275 from the origin."""
 
 
 @rule("OSIM843", "load-columns", severity=ERROR, mends="both", about="document")
@@ -92,7 +95,8 @@ def load_place(setup: Setup, found: FindingSink) -> None:
     """A measured force acts far away from its body, or is expressed in another frame than its setup says.
 
     Puts the model into poses of the motion that the tool is given, and looks where measured forces act: at more than
-    40 cm from the origin of their body nothing of a foot or a hand is. Where a force is expressed in a body, it looks
+    40 cm from the origin, the mass centre, the joints, the markers and the contact surfaces of their body nothing of a
+    foot or a hand is, also where foot and shank are one body. Where a force is expressed in a body, it looks
     whether the numbers, as they are, point up more than they do when they are turned with that body. Torques are
     compared with what the force would do 40 cm farther away, and the sum of all forces, if it is as large as half the
     weight of the model, must point up.
@@ -204,6 +208,33 @@ def _acting(setup: Setup, force: Any, table: Table | None, motion: Table) -> lis
             body, of_force, of_point = within
             if body is not None and of_force is not None and of_point is not None:
                 direction = (x / size, y / size, z / size)
-                away = math.dist(body.position, of_point.of((px, py, pz)))
+                point = of_point.of((px, py, pz))
+                known = _points_of(setup).get(names[0], [])
+                away = min(math.dist(body.of(place), point) for place in [(0.0, 0.0, 0.0), *known])
                 result.append(_Push(away, math.hypot(*torque) / size, size, direction, of_force.turned(direction)))
+    return result
+
+
+@once
+def _points_of(setup: Setup) -> dict[str, list[Vector]]:
+    """By name of each body, what is known to lie on it, m: its mass centre, frames of joints, markers and contacts."""
+    subject = model_subject(setup)
+    result: dict[str, list[Vector]] = {}
+
+    def add(frame: Any, location: Sequence[float]) -> None:
+        base = on_base(subject, frame)
+        if base is not None and len(location) == 3 and not any(map(math.isnan, location)):
+            x, y, z = location
+            result.setdefault(str(base[0].name), []).append(base[1].of((x, y, z)))
+
+    for body in subject.named("Body"):
+        add(body, body.mass_center)
+    for joint in subject.named("Joint"):
+        for tag in ("socket_parent_frame", "socket_child_frame"):
+            add(subject.target_of(joint, tag), (0.0, 0.0, 0.0))
+    for station in subject.named("Marker"):
+        add(subject.target_of(station, "socket_parent_frame"), station.location)
+    for surface in subject.named("ContactGeometry"):
+        if not is_a(surface, "ContactHalfSpace"):
+            add(subject.target_of(surface, "socket_frame"), surface.location)
     return result

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from osimlite.lint.engine import ERROR, FindingSink, rule
 from osimlite.lint.setup import UNGIVEN, Setup, is_given, members
 from osimlite.lint.words import called, nearest_name
@@ -77,7 +79,8 @@ not X, Y or Z, without a word, and the body keeps its size.
 is lost.
   <marker_file>leg.trc</marker_file> <time_range>0 0.5</time_range>
 + <output_model_file>placed.osim</output_model_file>
-12 static-times, error, in placer: The times of the static trial are none to average over. OpenSim fails.
+12 static-times, error, in placer: The times of the static trial are none to average over, or the trial has a single
+frame. OpenSim fails; repeat the frame at a later time.
   <marker_file>leg.trc</marker_file> <output_model_file>placed.osim</output_model_file>
 - <time_range>0.5 0.5</time_range>
 + <time_range>0 0.5</time_range>
@@ -165,3 +168,27 @@ def scale_setting(setup: Setup, found: FindingSink) -> None:
                 f"times from {placer.time_range[0]:g} to {placer.time_range[-1]:g} s cannot be averaged: OpenSim fails",
                 placer, tag="time_range", fault="static-times",
             )  # fmt: skip
+        elif placer.apply and len(placer.time_range) == 2 and is_given(placer.marker_file):
+            _check_static_times(setup, placer, found)
+
+
+def _check_static_times(setup: Setup, placer: Any, found: FindingSink) -> None:
+    """Report a static trial of which the times of the placer hold one moment only, or none."""
+    table = setup.table(placer.marker_file)
+    if table is None or table.span is None or not table.is_markers:
+        return
+    first, last = max(placer.time_range[0], table.span[0]), min(placer.time_range[1], table.span[1])
+    if first < last:
+        return
+    if table.span[0] == table.span[1]:
+        found(
+            f"'{placer.marker_file}' has one frame, at {table.span[0]:g} s, and OpenSim averages over a range of "
+            "times: it fails; repeat the row at a later time",
+            placer, tag="marker_file", fault="static-times",
+        )  # fmt: skip
+    else:
+        found(
+            f"'{placer.marker_file}' goes from {table.span[0]:g} to {table.span[1]:g} s, of which the times of the "
+            "tool hold no two: OpenSim fails",
+            placer, tag="time_range", fault="static-times",
+        )  # fmt: skip

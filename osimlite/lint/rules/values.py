@@ -16,6 +16,9 @@ from osimlite.schema.fields import Value
 from osimlite.schema.specs import FieldSpec, field_specs
 from osimlite.text import listed, nearest
 
+KEEPS_DEFAULT = "OpenSim keeps the default"
+"""What a message says of a value that OpenSim cannot read, where it goes on."""
+
 
 @rule("OSIM201", "unreadable-value", severity=ERROR, mends="safe")
 def unreadable_value(subject: Subject, found: FindingSink) -> None:
@@ -108,8 +111,9 @@ def empty_value(subject: Subject, found: FindingSink) -> None:
     Reports empty numbers, vectors and switches, and elements in which an object should stand. Properties that may be
     left out may also be empty.
 
-    OpenSim writes a line to its log and keeps the default. The mass of a body has none: OpenSim refuses the model. And
-    where an object should stand OpenSim then has none, and fails as soon as it needs one.
+    OpenSim writes a line to its log and keeps the default: that is a warning. The mass of a body has no default, nor
+    have numbers of setups of older classes, as `initial_time` of AnalyzeTool: OpenSim refuses the file. Where an object
+    should stand OpenSim then has none, and fails as soon as it needs one. Both are errors.
 
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
@@ -124,6 +128,7 @@ def empty_value(subject: Subject, found: FindingSink) -> None:
                 f"{subject.titled(owner, spec)} is empty, not {kind.words()}: {_kept(note, owner, spec, kind)}",
                 owner,
                 number=note.number,
+                severity=ERROR if _is_refused(note, spec, kind) else WARNING,
             )
     for note in subject.notes:
         held = note.spec
@@ -172,6 +177,11 @@ def _text(owner: Object, spec: FieldSpec) -> str:
     return " ".join(split(raw[1])) if raw else ""
 
 
+def _is_refused(note: Note, spec: FieldSpec, kind: Value) -> bool:
+    """Whether OpenSim refuses to load a file for a value that it cannot read."""
+    return note.value is None and (kind.legacy or (spec.tag == "mass" and spec.default != spec.default))
+
+
 def _kept(note: Note, owner: Object, spec: FieldSpec, kind: Value) -> str:
     """What OpenSim goes on with."""
     if note.value is not None:
@@ -180,7 +190,7 @@ def _kept(note: Note, owner: Object, spec: FieldSpec, kind: Value) -> str:
         return "OpenSim refuses to load the file"
     if spec.tag == "mass" and spec.default != spec.default:
         return "without a mass OpenSim refuses to load the file"
-    return f"OpenSim keeps the default, {shown(field_specs(type(owner))[spec.tag].default)}"
+    return f"{KEEPS_DEFAULT}, {shown(field_specs(type(owner))[spec.tag].default)}"
 
 
 def _foreign(text: str) -> str:

@@ -88,6 +88,7 @@ class RecordedMotion(Movement):
         values: (t, n) in the order of the mechanism's coordinates, rad and m.
         missing: coordinates that the record does not have; they keep their default values.
         ignored: columns of the record that name no coordinate.
+        named_by_path: coordinates whose columns have no plain names, but paths as in files of states.
         around: times (s,) and values (s, n) that are differentiated, where these go on beyond `times`.
     """
 
@@ -97,6 +98,7 @@ class RecordedMotion(Movement):
     missing: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
     around: tuple[Array, Array] | None = None
+    named_by_path: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, mechanism: Mechanism, source: Recorded, times: ArrayLike | None = None) -> RecordedMotion:
@@ -197,7 +199,10 @@ class RecordedMotion(Movement):
             told += "fill the gaps" if not np.isfinite(values[row, place]) else "no body goes so far"
             raise DocumentError(told, file=table.file)
         missing = tuple(info.name for place, info in enumerate(mechanism.coordinates) if place not in result)
-        return cls(mechanism, table.times, values, missing, tuple(ignored))
+        plain = {*table.columns}
+        by_path = tuple(mechanism.coordinates[place].name for place in sorted(result))
+        by_path = tuple(name for name in by_path if name not in plain)
+        return cls(mechanism, table.times, values, missing, tuple(ignored), named_by_path=by_path)
 
     @cached_property
     def rates(self) -> tuple[Array, Array]:

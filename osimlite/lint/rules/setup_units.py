@@ -1,0 +1,229 @@
+"""OSIM857, OSIM858 and OSIM859: units of markers and loads beside the model, and ground that pushes twice."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from typing import Any
+
+from osimlite.lint.engine import WARNING, FindingSink, rule
+from osimlite.lint.placement import on_base
+from osimlite.lint.posture import marker_places, model_subject
+from osimlite.lint.rules.setup_markers import cells_of, rows_between
+from osimlite.lint.setup import Setup, members
+from osimlite.lint.table import Table
+from osimlite.schema.frames import Ground
+from osimlite.schema.tree import is_a
+from osimlite.tables import METRES
+from osimlite.text import listed
+
+_ALIKE = 0.3, 3.0
+"""Between these, the size of a body that was measured over that of the model can be believed."""
+_ROWS = 50
+"""How many rows of markers are looked at."""
+_FEWEST = 3
+"""Markers that must be in both data and model."""
+_SLIGHT = 0.02
+"""Loads that are never more than this part of the weight of the model are doubted."""
+_WEIGHTS = 0.2, 10.0
+"""In newtons, the largest load of a trial is between these parts of the weight of the model."""
+
+
+@rule("OSIM857", "marker-size", severity=WARNING, about="document")
+def marker_size(setup: Setup, found: FindingSink) -> None:
+    """The measured markers are spread over another size than those of the model.
+
+    Compares the box around the markers of a frame, in the units that the file declares, with the box around the same
+    markers of the model in its default pose. If these differ by more than a factor of three, and in other units they
+    would not, the rule names these units.
+
+    OpenSim reads centimetres that are declared as millimetres without a word: inverse kinematics ends with errors of
+    decimetres, and a scaled model has a tenth of the size.
+
+    ```setup
+      <InverseKinematicsTool name="ik">
+          <model_file>sides.osim</model_file>
+    -     <marker_file>sides_centimetres.trc</marker_file>
+    +     <marker_file>sides.trc</marker_file>
+          <time_range>0 0.02</time_range>
+          <output_motion_file>ik.mot</output_motion_file>
+      </InverseKinematicsTool>
+    ```
+    """
+    users = setup.having("marker_file", "time_range")
+    for user, table in setup.with_tables(users, "marker_file"):
+        units = table.entries.get("Units")
+        unit = METRES.get(units.value.text) if units is not None else None
+        if setup.tree is None or not table.is_markers or unit is None or units is None:
+            continue
+        if not getattr(user, "apply", True):
+            continue
+        places, columns = marker_places(setup), dict(cells_of(table))
+        names = [name for name in columns if name in places]
+        sizes = []
+        for row in islice(rows_between(table, user.time_range), _ROWS):
+            seen = {name: row[columns[name]] for name in names}
+            seen = {name: cells for name, cells in seen.items() if not any(map(math.isnan, cells)) and any(cells)}
+            if len(seen) >= _FEWEST and (own := _size([places[name] for name in seen])):
+                sizes.append(_size([*seen.values()]) / own)
+        if not sizes:
+            continue
+        ratio = sorted(sizes)[len(sizes) // 2]
+        low, high = _ALIKE
+        better = [name for name in ("m", "cm", "mm") if low <= ratio * METRES[name] <= high]
+        if better and not low <= ratio * unit <= high:
+            found(
+                f"the markers of '{user.marker_file}' are spread over {ratio * unit:.3g} of the size that they have in "
+                f"the model if the units are '{units.value.text}', as the file says: are they in {better[0]}?",
+                user, tag="marker_file",
+            )  # fmt: skip
+
+
+def _size(points: Sequence[Sequence[float]]) -> float:
+    """The diagonal of the box around points."""
+    return math.hypot(*(max(axis) - min(axis) for axis in zip(*points, strict=True)))
+
+
+@rule("OSIM858", "load-units", severity=WARNING, about="document")
+def load_units(setup: Setup, found: FindingSink) -> None:
+    """Measured loads are too small for the model, as if they were in kilonewtons.
+
+    Adds up the sizes of all measured forces in each row, and compares the largest sum with the weight of the model. If
+    it is less than 2 % of that, and a thousand times as much would be right for forces of the ground, the rule reports
+    it.
+
+    OpenSim takes all forces for newtons, whatever the header of the file says: the residual forces of inverse dynamics
+    are then the whole weight.
+
+    ```setup
+      <ExternalLoads name="loads">
+          <objects>
+              <ExternalForce name="right">
+                  <applied_to_body>shank</applied_to_body>
+                  <force_identifier>ground_force_v</force_identifier>
+                  <point_identifier>ground_force_p</point_identifier>
+              </ExternalForce>
+          </objects>
+    -     <datafile>kilonewtons.mot</datafile>
+    +     <datafile>leg_grf.mot</datafile>
+      </ExternalLoads>
+    ```
+    """
+    if setup.tree is None:
+        return
+    model: Any = setup.tree.model
+    mass = sum(body.mass for body in setup.tree.members("/bodyset", "Body").values())
+    weight = mass * math.hypot(*model.gravity)
+    for loads, table in setup.with_tables(setup.named("ExternalLoads"), "datafile"):
+        largest = _largest_load([force for force in members(loads, "ExternalForce") if force.appliesForce], table)
+        low, high = _WEIGHTS
+        if 0.0 < largest < _SLIGHT * weight and low <= 1000.0 * largest / weight <= high:
+            found(
+                f"the forces of '{loads.datafile}' are never larger than {largest:.3g} N together, and the model "
+                f"weighs {weight:.0f} N: are they in kilonewtons?",
+                loads, tag="datafile",
+            )  # fmt: skip
+
+
+def _largest_load(forces: Sequence[Any], table: Table) -> float:
+    """The largest sum, N, of the sizes of some forces in a row of their table."""
+    prefixes = [str(force.force_identifier) for force in forces if force.force_identifier]
+    places = [
+        [place for place, label in enumerate(table.columns, 1) if label.startswith(prefix)] for prefix in prefixes
+    ]
+    places = [own for own in places if len(own) == 3]
+    sums = (
+        sum(math.hypot(*(row[place] for place in own)) for own in places)
+        for row in table.rows.samples
+        if len(row) == len(table.labels)
+    )
+    return max((size for size in sums if math.isfinite(size)), default=0.0)
+
+
+@rule("OSIM859", "ground-twice", severity=WARNING, about="document")
+def ground_twice(setup: Setup, found: FindingSink) -> None:
+    """A contact of the model and a measured load both push a body from the ground.
+
+    Looks for measured forces on bodies that have contact surfaces, and for contact forces of the model between such a
+    surface and one that is fixed to ground, which the tool does not exclude.
+
+    OpenSim lets both act: the ground pushes twice, and the residual forces are as large as the weight. Exclude the
+    contact forces by `forces_to_exclude`, or switch them off in the model.
+
+    ```setup
+      <InverseDynamicsTool name="id">
+          <model_file>foot_contact.osim</model_file>
+          <time_range>0 0.4</time_range>
+    -     <forces_to_exclude>Muscles</forces_to_exclude>
+    +     <forces_to_exclude>Muscles foot_ground</forces_to_exclude>
+          <external_loads_file>leg_grf.xml</external_loads_file>
+          <coordinates_file>leg.mot</coordinates_file>
+      </InverseDynamicsTool>
+    ```
+    """
+    if setup.tree is None:
+        return
+    for tool in setup.having("external_loads_file"):
+        if getattr(tool, "replace_force_set", False):
+            continue
+        loads: Any = setup.document(tool.external_loads_file)
+        if loads is None or not is_a(loads, "ExternalLoads"):
+            continue
+        loaded = {
+            str(force.applied_to_body).rpartition("/")[2]
+            for force in members(loads, "ExternalForce")
+            if force.appliesForce
+        }
+        twice = [
+            (force, body)
+            for force, bodies in _ground_contacts(setup)
+            if not _is_excluded(setup, tool, force)
+            for body in sorted(bodies & loaded)
+        ]
+        if twice:
+            names = listed([f"'{force.name}'" for force, _ in twice], most=3)
+            bodies = listed(sorted({body for _, body in twice}), most=3)
+            tag = "forces_to_exclude" if hasattr(tool, "forces_to_exclude") else "external_loads_file"
+            found(
+                f"{names} of the model and the loads of '{tool.external_loads_file}' both push {bodies} from the "
+                "ground: exclude the contact forces, or the ground counts twice",
+                tool, tag=tag,
+            )  # fmt: skip
+
+
+def _ground_contacts(setup: Setup) -> Iterator[tuple[Any, set[str]]]:
+    """Every force of the model that acts between surfaces on ground and on bodies, with the names of these bodies."""
+    subject = model_subject(setup)
+    for force in subject.named("Force"):
+        if not force.appliesForce:
+            continue
+        bases = [
+            base[0]
+            for surface in _surfaces(setup, force)
+            if (base := on_base(subject, subject.target_of(surface, "socket_frame"))) is not None
+        ]
+        if any(isinstance(base, Ground) for base in bases):
+            names = {str(base.name) for base in bases if not isinstance(base, Ground)}
+            if names:
+                yield force, names
+
+
+def _surfaces(setup: Setup, force: Any) -> Iterator[Any]:
+    """The contact surfaces that a force names."""
+    subject = model_subject(setup)
+    for use in subject.uses:
+        if use.owner is force:
+            target = subject.resolution(use).target
+            if target is not None and is_a(target, "ContactGeometry"):
+                yield target
+
+
+def _is_excluded(setup: Setup, tool: Any, force: Any) -> bool:
+    """Whether a tool switches a force of the model off."""
+    names = {str(name) for name in getattr(tool, "forces_to_exclude", ())}
+    if "all" in {name.lower() for name in names} or force.name in names:
+        return True
+    model: Any = setup.tree.model if setup.tree is not None else None
+    groups = {group.name: group.members for group in model.force_set.groups}
+    return any(force.name in map(str, groups.get(name, ())) for name in names)
