@@ -184,4 +184,4 @@ def test_marker_errors_where_a_marker_is_unseen(tmp_path: Path, which: str) -> N
     assert ran, log
     ours = osimlite.run(folder / "ik.xml", folder / "ours").tables["ik_ik_marker_errors.sto"]
     assert np.isfinite(ours.rows).all()
-    assert difference(ours, folder / "theirs" / "ik_ik_marker_errors.sto") < 2e-7
+    assert difference(ours, folder / "theirs" / "ik_ik_marker_errors.sto") < 2e-5
