@@ -1,7 +1,8 @@
 """Compare the verdicts of two versions of the linter with OpenSim's, on models with faults.
 
     python benchmarks/verdicts.py --edits 1000 [--before FOLDER]     random edits of real models
-    python benchmarks/verdicts.py --pairs 2000 [--before FOLDER]     two random faults at once
+    python benchmarks/verdicts.py --pairs 2000 [--before FOLDER]     two random edits at once
+    python benchmarks/verdicts.py --faults 8000 [--before FOLDER]    two of the walker's faults at once
 
 `--before` names the folder of another version of osimlite, whose verdicts stand beside those of this
 one. A verdict is *missed* if OpenSim 4.6 does not load or initialise the model, or computes NaN
@@ -24,8 +25,10 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Iterator
+from itertools import chain, combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 HERE = Path(__file__).resolve().parent
 SECONDS = 20
@@ -119,6 +122,14 @@ def read_models(shared: Path, folder: Path) -> list[Path]:
     return result
 
 
+class Trial(NamedTuple):
+    """A model with faults."""
+
+    path: Path  # of the sound model
+    text: str
+    what: str  # the faults, for people
+
+
 def edit_once(text: str, draw: random.Random) -> tuple[str, str]:
     """Return a text with one random edit, and what was done."""
     from tests.oracle.structural_edits import Text, edits
@@ -127,11 +138,45 @@ def edit_once(text: str, draw: random.Random) -> tuple[str, str]:
     return edit.text, edit.what
 
 
+def edit_models(texts: dict[Path, str], singles: int, pairs: int, draw: random.Random) -> Iterator[Trial]:
+    """Yield models with one random edit, then others with two."""
+    paths = [*texts]
+    for number in range(singles + pairs):
+        path = draw.choice(paths)
+        text, what = edit_once(texts[path], draw)
+        if number >= singles:
+            try:
+                text, more = edit_once(text, draw)
+            except (IndexError, KeyError, ValueError):
+                # The first edit has left nothing to edit.
+                continue
+            what = f"{what}; {more}"
+        yield Trial(path, text, what)
+
+
+def combine_faults(path: Path, count: int, draw: random.Random) -> Iterator[Trial]:
+    """Yield the walker with two of its measured faults: all pairs, or so many of them at random."""
+    from tests.lint.faults import FAULTS
+
+    text = path.read_text(encoding="utf-8")
+    pairs = [*combinations(FAULTS, 2)]
+    if count < len(pairs):
+        pairs = draw.sample(pairs, count)
+    for first, second in pairs:
+        try:
+            changed = second.change(first.change(text)[0])[0]
+        except (ValueError, AssertionError):
+            # The first fault has taken away what the second changes.
+            continue
+        yield Trial(path, changed, f"{first.name}; {second.name}")
+
+
 def main() -> None:
     """Run the comparison and print the table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--edits", type=int, default=0)
     parser.add_argument("--pairs", type=int, default=0)
+    parser.add_argument("--faults", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--before", type=Path)
     parser.add_argument("--shared", type=Path, default=HERE.parents[1] / "shared")
@@ -155,20 +200,23 @@ def main() -> None:
     draw = random.Random(chosen.seed)
     log = [] if chosen.log is None else [chosen.log.open("w", encoding="utf-8")]
     with tempfile.TemporaryDirectory() as place:
-        models = read_models(chosen.shared, Path(place))
+        models = []
+        if chosen.edits or chosen.pairs:
+            models = read_models(chosen.shared, Path(place))
         texts = {path: path.read_text(encoding="utf-8", errors="replace") for path in models}
-        known = {name: {path: Counter(linter.errors(path)) for path in models} for name, linter in linters.items()}
+        walker = Path(place) / "walker.osim"
+        walker.write_bytes((HERE.parent / "fixtures/walker/DynamicWalkerModel.osim").read_bytes())
+        known = {
+            name: {path: Counter(linter.errors(path)) for path in [*models, walker]} for name, linter in linters.items()
+        }
         counts: Counter[Any] = Counter()
-        for number in range(chosen.edits + chosen.pairs):
-            path = draw.choice(models)
-            text, what = edit_once(texts[path], draw)
-            if number >= chosen.edits:
-                try:
-                    text, more = edit_once(text, draw)
-                except (IndexError, KeyError, ValueError):
-                    # The first edit has left nothing to edit.
-                    continue
-                what = f"{what}; {more}"
+        trials = chain(
+            edit_models(texts, chosen.edits, chosen.pairs, draw),
+            combine_faults(walker, chosen.faults, draw) if chosen.faults else (),
+        )
+        for number, (path, text, what) in enumerate(trials):
+            if number % 50 == 0:
+                print(f"{number}: {dict(counts)}", file=sys.stderr, flush=True)
             edited = path.with_name("edited.osim")
             edited.write_text(text, encoding="utf-8")
             verdict = ask_opensim(edited)

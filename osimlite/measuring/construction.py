@@ -68,7 +68,7 @@ class _Construction:
         is_complete = all(failure.stage == Stage.UNSUPPORTED for failure in failures)
         try:
             q = mechanism.assemble({})
-        except SimulationError as error:
+        except OsimliteError as error:
             yield from self.describe_assembly(error)
             return
         yield from self.find_clamps(mechanism, q)
@@ -100,10 +100,11 @@ class _Construction:
             yield self.describe(error, Stage.FORCE)
 
     # ------------------------------------------------------------------------------- default pose
-    def describe_assembly(self, error: SimulationError) -> Iterator[Obstacle]:
+    def describe_assembly(self, error: OsimliteError) -> Iterator[Obstacle]:
         """Yield an obstacle for each constraint that the default pose does not meet."""
         if not isinstance(error, UnmetConstraintsError):
-            yield self.describe(error, Stage.ASSEMBLY)
+            is_pose = isinstance(error, SimulationError)
+            yield self.describe(error, Stage.ASSEMBLY if is_pose else Stage.MECHANISM)
             return
         for path, distance in error.errors.items():
             what = self.tree.by_path.get(path)

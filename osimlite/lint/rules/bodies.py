@@ -8,7 +8,7 @@ from typing import TypedDict
 
 from osimlite.lint.config import Threshold
 from osimlite.lint.diagnostic import Fix
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.inertia import possible_inertia, principal_axes
 from osimlite.lint.placement import on_base
@@ -105,7 +105,8 @@ def inertia_not_positive(subject: Subject, found: FindingSink) -> None:
 def no_inertia(subject: Subject, found: FindingSink) -> None:
     """A body has mass and no inertia.
 
-    Reports bodies with a mass whose inertia is zero or not given.
+    Reports bodies with a mass whose inertia is zero or not given; and, for information, those without a mass that have
+    an inertia, which OpenSim drops with a line in its log.
 
     All the mass is then in one point. A joint that turns about this point has no resistance at all: accelerations
     become NaN if the body is the last of its chain (an error), and the integrator takes ever smaller steps otherwise.
@@ -117,6 +118,13 @@ def no_inertia(subject: Subject, found: FindingSink) -> None:
     """
     inertia = Body.field_specs()["inertia"]
     for body in subject.each(Body):
+        if body.mass == 0.0 and any(body.inertia) and not subject.noted(body, inertia):
+            found(
+                f"{called(body)} has an inertia and no mass: OpenSim sets the inertia to zero",
+                body,
+                tag="inertia",
+                severity=INFO,
+            )
         if body.mass > 0 and not any(body.inertia) and not subject.noted(body, inertia):
             state = "is zero" if "inertia" in body.model_fields_set else "is not given"
             spins = _spins_freely(subject, body)

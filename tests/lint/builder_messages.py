@@ -1,0 +1,71 @@
+"""The messages with which the builder of mechanisms and forces refuses a model, read from its source."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+PACKAGE = Path(__file__).resolve().parents[2] / "osimlite"
+PARTS = (
+    "multibody/assembly.py",
+    "multibody/build.py",
+    "multibody/constraint_records.py",
+    "multibody/dynamics.py",
+    "multibody/formula.py",
+    "multibody/function_tables.py",
+    "multibody/functions.py",
+    "multibody/joints.py",
+    "multibody/motions.py",
+    "multibody/schema_constraints.py",
+    "multibody/schema_frames.py",
+    "multibody/schema_functions.py",
+    "multibody/schema_joints.py",
+    "simulation/elements",
+)
+"""Modules that build what a model describes."""
+
+ERRORS = {"ModelError", "UnsupportedError", "SimulationError", "UnmetConstraintsError", "_Impossible"}
+
+
+class Message(NamedTuple):
+    """One message: the module that raises it, and its text with `{}` for what is filled in."""
+
+    module: str
+    text: str
+
+    def matches(self, message: str) -> bool:
+        """Return whether a message of the builder is this one."""
+        parts = map(re.escape, self.text.split("{}"))
+        return re.search(".*?".join(parts), message, re.DOTALL) is not None
+
+
+def read_messages() -> list[Message]:
+    """Return every message, sorted by module."""
+    files: list[Path] = []
+    for part in PARTS:
+        path = PACKAGE / part
+        files += [path] if path.is_file() else sorted(path.rglob("*.py"))
+    result: dict[Message, None] = {}
+    for file in files:
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name | ast.Attribute) and node.args:
+                name = node.func.id if isinstance(node.func, ast.Name) else node.func.attr
+                text = _template(node.args[-1 if name == "unsupported" else 0])
+                known = name in ERRORS or (name == "unsupported" and len(node.args) > 1)
+                if known and text is not None and len(text.replace("{}", "").strip()) > 3:
+                    result[Message(str(file.relative_to(PACKAGE)), text)] = None
+    return [*result]
+
+
+def _template(node: ast.expr) -> str | None:
+    """Return the text of a string with `{}` for its expressions; None of anything else."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return node.value
+    if isinstance(node, ast.JoinedStr):
+        return "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in node.values)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+        left, right = _template(node.left), _template(node.right)
+        return None if left is None else left + (right or "{}")
+    return None
