@@ -7,7 +7,7 @@ place of characters of one line, or spaces in place of what stands in no element
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from html.entities import html5
 from typing import NamedTuple
 
@@ -83,21 +83,31 @@ def read_repaired(
     if len(tags) != len(spans) or any(span.tag != as_written(tag) for span, tag in zip(spans, tags, strict=True)):
         raise fault
     notes = []
-    for repair in sorted(repairs, key=lambda repair: repair.offset):
+    repairs.sort(key=lambda repair: repair.offset)
+    for repair, number in zip(repairs, elements_at(source, [repair.offset for repair in repairs]), strict=True):
         line = source.position(repair.offset).line
-        notes.append(Note(repair.kind, element_at(source, repair.offset), repair.word, value=repair.meant, line=line))
+        notes.append(Note(repair.kind, number, repair.word, value=repair.meant, line=line))
     return root, notes
 
 
-def element_at(source: Source, offset: int) -> int:
-    """The number of the innermost element around a character; 0, the root, outside all."""
-    result = 0
-    for number, span in enumerate(source.spans):
-        if span.start > offset:
-            break
-        if offset < span.end:
-            result = number
-    return result
+def elements_at(source: Source, offsets: Sequence[int]) -> Iterator[int]:
+    """Yield the number of the innermost element around each of some characters; 0, the root, outside all.
+
+    Args:
+        source: the text.
+        offsets: of the characters, rising.
+    """
+    spans, count, following = source.spans, len(source.spans), 0
+    around: list[int] = []
+    for offset in offsets:
+        while following < count and spans[following].start <= offset:
+            while around and spans[around[-1]].end <= spans[following].start:
+                around.pop()
+            around.append(following)
+            following += 1
+        while around and spans[around[-1]].end <= offset:
+            around.pop()
+        yield around[-1] if around else 0
 
 
 def repaired(text: str) -> tuple[str, list[Repair]]:

@@ -68,6 +68,35 @@ def markup(text: str) -> Iterator[Markup]:
             yield Markup("empty" if match["empty"] else "open", match.start(), place, match["open"])
 
 
+_REMARK = re.compile(r"<(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)")
+
+
+def blank_remarks(text: str, character: str = " ") -> str:
+    """Return a text in which each comment, CDATA section, instruction and DOCTYPE is one character as often.
+
+    One that has no end stays as it is. An ending that was not found once is not looked for again, so that
+    the time is linear in the length of any text: a pattern such as `<!--.*?-->` looks for the end of each of
+    many open comments through all that follows.
+    """
+    pieces: list[str] = []
+    missing: set[str] = set()
+    place = 0
+    for match in _REMARK.finditer(text):
+        start = match.start()
+        ending = _SPECIAL[match["special"]][1]
+        if start < place or ending in missing:
+            continue
+        found = text.find(ending, match.end())
+        if found < 0:
+            missing.add(ending)
+            continue
+        end = found + len(ending)
+        pieces += [text[place:start], character * (end - start)]
+        place = end
+    pieces.append(text[place:])
+    return "".join(pieces)
+
+
 def spans_of(text: str) -> list[Span]:
     """Every element of a text in document order, found by the rules of :func:`markup`.
 

@@ -325,16 +325,34 @@ def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Repo
     return Report(unique, unmeasured=[f"{subject.file or 'the model'}{NOT_MEASURED}{why_not}"] if is_skipped else [])
 
 
-def _is_ignored(finding: Finding, comments: list[Suppression]) -> bool:
-    # Each comment notes that it was of use.
-    return any([comment.covers(finding, _RULES[finding.code].is_called) for comment in comments])
+MAX_SHORT_LINES = 3
+"""Lines of an ignoring comment that is found by its lines; others are asked for each finding."""
+
+
+def _ignored_by(comments: list[Suppression]) -> Callable[[Finding], bool]:
+    """Return what tells whether a comment ignores a finding; each comment notes that it was of use."""
+    by_line: dict[int, list[Suppression]] = {}
+    long: list[Suppression] = []
+    for comment in comments:
+        if comment.last - comment.first < MAX_SHORT_LINES:
+            for line in range(comment.first, comment.last + 1):
+                by_line.setdefault(line, []).append(comment)
+        else:
+            long.append(comment)
+
+    def is_ignored(finding: Finding) -> bool:
+        near = by_line.get(finding.line or 0, [])
+        return any([comment.covers(finding, _RULES[finding.code].is_called) for comment in (*long, *near)])
+
+    return is_ignored
 
 
 def _not_ignored(
     subject: Checked, comments: list[Suppression], findings: list[Finding], left_out: list[Rule]
 ) -> list[Finding]:
     """The findings without those that a comment of the file ignores, and with one for each comment without use."""
-    kept = [finding for finding in findings if not _is_ignored(finding, comments)]
+    is_ignored = _ignored_by(comments)
+    kept = [finding for finding in findings if not is_ignored(finding)]
     unused = next(known for known in all_rules() if known.name == "unused-ignore")
     if subject.config.wants(unused):
         result = FindingSink({"": unused}, subject, kept)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 import sys
+from bisect import bisect_left
 from collections.abc import Callable
+from operator import attrgetter
 
 from osimlite.document.source import Position, Source
 from osimlite.lint.diagnostic import Finding
 from osimlite.records import dataclass, field
 
-_COMMENT = re.compile(r"<!--\s*osimlite:\s*ignore\b([^>]*?)-->")
+_COMMENT = re.compile(r"<!--\s*osimlite:\s*ignore\b([^<>]*?)-->")
 _LINE = re.compile(r"^\W*osimlite:\s*ignore\b(.*)$")
 LAST_LINE = sys.maxsize
 
@@ -56,8 +58,9 @@ def suppressions(source: Source) -> list[Suppression]:
         if match.start() < root:
             first, last = 1, LAST_LINE
         elif not line_before.strip():
-            following = next((span for span in source.spans if span.start >= match.end()), None)
-            if following is not None:
+            number = bisect_left(source.spans, match.end(), key=attrgetter("start"))
+            if number < len(source.spans):
+                following = source.spans[number]
                 last = source.position(following.end - 1).line
         result.append(Suppression(place, _codes(match[1]), first, last))
     return result

@@ -6,12 +6,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from osimlite.errors import UnsupportedError
 from osimlite.lint.measures import LengthOnSurface, Measures, NoMachineCodeError, Pose, swept_places, together
 from osimlite.measuring.jumps import jumps
 from osimlite.measuring.muscles import fibers_of, reach_of, start_of
 from osimlite.measuring.points import moving_points
 from osimlite.measuring.sweeps import Sweep, sweeps
 from osimlite.measuring.wrapping import wrappings
+from osimlite.multibody.constraints import Coupler, Lock, Prescribed
+from osimlite.multibody.mechanism import Mechanism
 from osimlite.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.gather import GEODESIC
@@ -25,6 +28,9 @@ NEEDS_MACHINE_CODE = (
     "or run: pip install 'osimlite[jit]'"
 )
 """Why paths around many surfaces are not measured."""
+
+MAX_LOOP_CONSTRAINTS = 8
+"""Constraints other than couplers of a model that is measured. Shoulders and knees of publications have up to six."""
 
 MIDDLE = 0.5
 """Part of a range in which fibers are looked at: at the ends, few muscles have not reached a limit."""
@@ -53,6 +59,7 @@ def measured(model: Model, *, compiles: bool, known: tuple[Measures, Measures] |
     paths = Paths(model, code=code, left_out=still.swept if still is not None else ())
     has_surfaces = any(isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values())
     around = paths.around_surfaces(model, GEODESIC, code) if has_surfaces else None
+    _expect_few_loops(paths.mechanism)
     start = paths.mechanism.assemble({})
     default = np.array(list(paths.lengths(start).values()))
     looked_at = sweeps(paths, start, set() if still is None else swept_places(still))
@@ -86,6 +93,21 @@ def _on_surfaces(paths: Paths, start: Array, looked_at: list[Sweep]) -> Iterator
     for name, surface, lengths in paths.system.all_on_surfaces(every, paths.routes):
         for k in np.flatnonzero(~(lengths >= 0.0))[:1]:
             yield LengthOnSurface(name, surface, float(lengths[k]), poses[k])
+
+
+def _expect_few_loops(mechanism: Mechanism) -> None:
+    """Refuse models with so many loops that poses cannot be assembled in the time of a check.
+
+    Couplers are not counted: a spine has a hundred, and they are assembled at once.
+
+    Raises:
+        UnsupportedError: there are more than `MAX_LOOP_CONSTRAINTS` constraints that close loops.
+    """
+    count = sum(not isinstance(each, Coupler | Lock | Prescribed) for each in mechanism.constraints)
+    if count > MAX_LOOP_CONSTRAINTS:
+        raise UnsupportedError(
+            f"{count} constraints of it close loops, and the poses of at most {MAX_LOOP_CONSTRAINTS} are measured"
+        )
 
 
 def _ends(looked_at: list[Sweep], default: Array) -> Iterator[tuple[tuple[float, Pose], tuple[float, Pose]]]:

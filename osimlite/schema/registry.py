@@ -231,6 +231,7 @@ def tags() -> tuple[str, ...]:
     return tuple(sorted(tag for tag in known if class_for(tag) is not None))
 
 
+@by_tags
 def classes_mentioning(word: str) -> tuple[type[Object], ...]:
     """Return the classes, abstract ones too, in whose modules a word stands, and those of plug-ins.
 

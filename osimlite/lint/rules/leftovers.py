@@ -9,9 +9,9 @@ from math import isfinite
 from osimlite.document.lexical import ABSENT, Unclean, converter
 from osimlite.document.names import ATTRIBUTE
 from osimlite.document.source import Source
+from osimlite.document.spans import blank_remarks
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import without_attribute, without_element, without_text
-from osimlite.lint.rules.markup import REMARKS
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Component
@@ -115,7 +115,7 @@ def stray_text(subject: Subject, found: FindingSink) -> None:
 def _beside_elements(source: Source) -> Iterator[tuple[int, str]]:
     """Where text stands beside elements, and the text; what stands in a comment is none."""
     if source.mixed is None:
-        plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), _without_remarks(source.text))
+        plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), blank_remarks(source.text))
         for start, end in {match.span(1) for pattern in (_AFTER, _BEFORE) for match in pattern.finditer(plain)}:
             yield start, plain[start:end].rstrip()
         return
@@ -123,14 +123,10 @@ def _beside_elements(source: Source) -> Iterator[tuple[int, str]]:
         begin, around = source.spans[number].tag_end, source.spans[number].inner_end
         inner = [source.spans[child] for child in source.children(number)]
         for end, behind in (*((span.start, span.end) for span in inner), (around, around)):
-            plain = _without_remarks(source.text[begin:end])
+            plain = blank_remarks(source.text[begin:end])
             if text := plain.strip():
                 yield begin + plain.index(text), text
             begin = behind
-
-
-def _without_remarks(text: str) -> str:
-    return REMARKS.sub(lambda match: " " * len(match[0]), text)
 
 
 @rule("OSIM110", "defaults", severity=WARNING, mends="safe")
@@ -279,5 +275,6 @@ _OF_TOOLS = {
 """Classes that are no part of a model and that old files hold defaults of: how OpenSim reads what they say."""
 _KEPT_WHOLE = frozenset(("unknown-tag", "unknown-class", "wrong-class", "wrong-name", "duplicate-tag"))
 _QUOTED = re.compile(r"=\s*+(?:\"[^\"<]*>[^\"<]*\"|'[^'<]*>[^'<]*')")
-_AFTER = re.compile(r"(?:</[^>]+>|/>)\s*([^\s<][^<]*)")
-_BEFORE = re.compile(r"<[^/!?>][^>]*(?<!/)>\s*([^\s<][^<]*)<(?![/!?])")
+# A tag is looked for from the last "<" before its ">": else the time would be that of all open ones.
+_AFTER = re.compile(r"(?:</[^<>]+>|/>)\s*+([^<]++)")
+_BEFORE = re.compile(r"<[^/!?<>][^<>]*+(?<!/)>\s*+([^<]++)<(?![/!?])")

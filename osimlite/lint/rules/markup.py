@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 
 from osimlite.document.source import Source
+from osimlite.document.spans import blank_remarks
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced, without_text
 from osimlite.lint.subject import Subject
 
-REMARKS = re.compile(r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<!DOCTYPE[^>]*>", re.DOTALL)
-"""Everything in which a tag is no tag."""
 _CONTROLS = re.compile("[\f\v]")
 # The bracket first: one character is searched for much faster than a class of them.
 _BLANK_BEFORE_END = re.compile(r">(?<=\s>)")
@@ -203,7 +202,7 @@ def closing_tag(subject: Subject, found: FindingSink) -> None:
     source = subject.source
     if source is None or not _BLANK_BEFORE_END.search(source.text):
         return
-    plain = REMARKS.sub(lambda match: "-" * len(match[0]), source.text)
+    plain = blank_remarks(source.text, "-")
     for match in _BLANK_IN_CLOSING.finditer(plain):
         start, end = match.span(1)
         found(
