@@ -37,7 +37,7 @@ def test_the_language_server_needs_its_own_extra_alone(fixtures: Path, tmp_path:
     text = (fixtures / "lint" / "OSIM413" / "fail-01-example.osim").read_text(encoding="utf-8")
     uri = (tmp_path / "m.osim").as_uri()
     document = {"uri": uri, "languageId": "xml", "version": 1, "text": text}
-    messages = [
+    messages: list[dict[str, Any]] = [
         {"id": 1, "method": "initialize", "params": {"processId": None, "rootUri": None, "capabilities": {}}},
         {"method": "initialized", "params": {}},
         {"method": "textDocument/didOpen", "params": {"textDocument": document}},
