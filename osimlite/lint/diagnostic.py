@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from enum import StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 from osimlite._lazy import shown_in_notebooks
 from osimlite.records import dataclass, field
@@ -102,8 +102,16 @@ class Finding:
         return visible(f"{self.place}: {self.severity} {self.code} {self.message}{hint}")
 
 
-NOT_MEASURED = ": not measured: "
-"""Stands between the name of a file and the reason in `Report.unmeasured`."""
+NOT_MEASURED = " not measured: "
+"""Stands between file and rules, and the reason, in `Report.unmeasured`."""
+
+
+class NotMeasured(NamedTuple):
+    """A note on a file of which some rules were not measured, for want of the numeric packages."""
+
+    file: str
+    code: str  # with which the codes of the first of these rules begin
+    message: str
 
 
 @dataclass(slots=True)
@@ -111,8 +119,8 @@ class Report:
     """Everything found in one or several models, sorted by file and place.
 
     `texts` holds the text of each file with findings, for the snippets of a reporter; `checked` counts the files,
-    `known` what a baseline has left out. `unmeasured` has, of each file whose paths and muscles could not be measured,
-    its name, `NOT_MEASURED` and why. `passed` names the files of a folder that are none of OpenSim's.
+    `known` what a baseline has left out. `unmeasured` has a sentence for each file of which some rules were not
+    measured: its name, which rules, and why. `passed` names the files of a folder that are none of OpenSim's.
     """
 
     findings: list[Finding] = field(default_factory=list)
@@ -149,17 +157,18 @@ class Report:
         """How often each code was found."""
         return Counter(finding.code for finding in self.findings)
 
-    def missing_package_notes(self) -> list[tuple[str, str]]:
-        """Return the files that were not measured for want of the numeric packages, each with a message.
+    def missing_package_notes(self) -> list[NotMeasured]:
+        """Return a note for each file that was not measured for want of the numeric packages.
 
         Reports for programs contain these notes; other reasons follow from findings, which they contain anyway.
         """
-        parts = [text.partition(NOT_MEASURED) for text in self.unmeasured]
-        return [
-            (file, f"rules OSIM42, OSIM53 and OSIM63 (construction, paths, muscles) not measured: {reason}")
-            for file, _, reason in parts
-            if reason.startswith("needs osimlite[")
-        ]
+        notes = []
+        for text in self.unmeasured:
+            before, _, reason = text.partition(NOT_MEASURED)
+            file, _, families = before.rpartition(": rules ")
+            if reason.startswith("needs osimlite["):
+                notes.append(NotMeasured(file, families[:6], f"rules {families}{NOT_MEASURED}{reason}"))
+        return notes
 
     def at_least(self, severity: Severity) -> list[Finding]:
         """The findings that are as bad as `severity` or worse."""

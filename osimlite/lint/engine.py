@@ -30,7 +30,7 @@ from osimlite.records import dataclass, replace
 from osimlite.schema.base import Object
 from osimlite.schema.model import Model
 from osimlite.schema.registry import let_count
-from osimlite.text import brief
+from osimlite.text import brief, listed
 
 ERROR, WARNING, INFO = Severity.ERROR, Severity.WARNING, Severity.INFO
 
@@ -321,8 +321,11 @@ def run(subject: Checked, *, measure: bool = True, recall: bool = False) -> Repo
     unique = list(dict.fromkeys(findings))
     unique.sort(key=lambda finding: (finding.line or 0, finding.column or 0, finding.code))
     why_not = why_not or unbuilt
-    is_skipped = bool(why_not) and measure
-    return Report(unique, unmeasured=[f"{subject.file or 'the model'}{NOT_MEASURED}{why_not}"] if is_skipped else [])
+    unmeasured = []
+    if why_not and measure:
+        families = listed(dict.fromkeys(sorted(known.code[:6] for known in left_out)))
+        unmeasured.append(f"{subject.file or 'the model'}: rules {families}{NOT_MEASURED}{why_not}")
+    return Report(unique, unmeasured=unmeasured)
 
 
 MAX_SHORT_LINES = 3

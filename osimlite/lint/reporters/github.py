@@ -10,7 +10,7 @@ _LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: 
 
 def render(report: Report) -> str:
     """Return one workflow command for each finding, and one if the numeric packages are not installed."""
-    notes = dict.fromkeys(message for _, message in report.missing_package_notes())
+    notes = dict.fromkeys(note.message for note in report.missing_package_notes())
     commands = [*map(_command, report.findings), *(f"::notice title=not-measured::{_data(text)}" for text in notes)]
     return "".join(f"{command}\n" for command in commands)
 

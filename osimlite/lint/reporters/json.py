@@ -9,16 +9,16 @@ from osimlite.text import json_lines
 def render(report: Report) -> str:
     """Return an array of objects: code, name, severity, message, file, line, column, component, suggestion, fixable.
 
-    Without the numeric packages the array ends with a note for each model that has something to measure. Its code is
-    that of all rules which measure, OSIM63, and its name is "not-measured".
+    Without the numeric packages the array ends with a note for each model that has something to measure. Its name is
+    "not-measured", and its code that of a family of rules that were left out, such as OSIM63.
     """
     notes = [
         {
-            "code": "OSIM63",
+            "code": note.code,
             "name": "not-measured",
             "severity": "info",
-            "message": message,
-            "file": file,
+            "message": note.message,
+            "file": note.file,
             "line": 1,
             "column": 1,
             "length": 1,
@@ -26,6 +26,6 @@ def render(report: Report) -> str:
             "suggestion": None,
             "fixable": False,
         }
-        for file, message in report.missing_package_notes()
+        for note in report.missing_package_notes()
     ]
     return json_lines([finding.as_dict() for finding in report.findings] + notes)

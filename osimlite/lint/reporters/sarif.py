@@ -26,7 +26,7 @@ def render(report: Report) -> str:
         "columnKind": "unicodeCodePoints",
         "results": [_result(finding, places[finding.code]) for finding in report.findings],
     }
-    notes = [message for _, message in report.missing_package_notes()]
+    notes = [note.message for note in report.missing_package_notes()]
     if notes:
         notifications = [{"level": "note", "message": {"text": text}} for text in dict.fromkeys(notes)]
         run["invocations"] = [{"executionSuccessful": True, "toolExecutionNotifications": notifications}]

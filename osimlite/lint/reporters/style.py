@@ -39,12 +39,12 @@ def summary(report: Report, colour: bool = False) -> str:
 
 
 def unmeasured(report: Report) -> str:
-    """Return the line about paths and muscles that were not measured, and why; nothing if they were."""
+    """Return the line about rules that were not measured, and why; nothing if all were."""
     if not report.unmeasured:
         return ""
     count = len(report.unmeasured) - 1
     more = f" (and {count} more {_plural('file', count)})" if count else ""
-    return visible(f"Construction, paths and muscles (OSIM42, OSIM53, OSIM63): {report.unmeasured[0]}{more}.")
+    return visible(f"{report.unmeasured[0]}{more}.")
 
 
 def passed(report: Report, everything: bool) -> str:
