@@ -83,7 +83,7 @@ if TYPE_CHECKING:
         "write",
     ]
 
-_FUNCTIONS = {
+FUNCTIONS = {
     "casadi": "osimlite.backends.functions",
     "classes_in": "osimlite.document.plugins",
     "read": "osimlite.document.reader",
@@ -121,8 +121,8 @@ def __getattr__(name: str) -> Any:
     if name == "__all__":
         from osimlite.schema.registry import MODULES
 
-        return sorted({*_FUNCTIONS, *MODULES})
-    module, _, inner = _FUNCTIONS.get(name, "").partition(":")
+        return sorted({*FUNCTIONS, *MODULES})
+    module, _, inner = FUNCTIONS.get(name, "").partition(":")
     if not module and not name.startswith("_"):
         from osimlite.schema.registry import MODULES
 
@@ -137,7 +137,7 @@ def __getattr__(name: str) -> Any:
             from osimlite.schema.registry import MODULES
             from osimlite.text import did_you_mean
 
-            near = did_you_mean(name, [*_FUNCTIONS, *MODULES])
+            near = did_you_mean(name, [*FUNCTIONS, *MODULES])
         raise AttributeError(f"module 'osimlite' has no attribute '{name}'{near}")
     return getattr(import_module(module), inner or name)
 
@@ -145,4 +145,4 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     from osimlite.schema.registry import MODULES
 
-    return sorted({*globals(), *_FUNCTIONS, *MODULES})
+    return sorted({*globals(), *FUNCTIONS, *MODULES})

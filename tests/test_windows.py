@@ -18,7 +18,7 @@ import pytest
 from osimlite import validate
 from osimlite.cli import main
 from osimlite.cli._console import wants_colour
-from osimlite.cli.simulate import _write
+from osimlite.cli.simulate import write_files
 from osimlite.errors import OsimliteError
 from osimlite.files import from_folder, write_atomically
 from osimlite.lint.baseline import write_baseline
@@ -27,7 +27,7 @@ from osimlite.lint.diagnostic import Finding, Report, Severity
 from osimlite.lint.many import check_files
 from osimlite.lint.reporters import render
 from osimlite.simulation import Trajectory
-from osimlite.sweep.pools import _LocalPool
+from osimlite.sweep.pools import LocalPool
 
 
 class Results:
@@ -39,7 +39,7 @@ class Results:
 
 
 def simulated(folder: Path) -> None:
-    _write(cast(Trajectory, Results()), folder)
+    write_files(cast(Trajectory, Results()), folder)
 
 
 @pytest.mark.usefixtures("windows_files")
@@ -85,7 +85,7 @@ def test_a_script_that_processes_run_anew_is_told_where_a_sweep_begins() -> None
             future.set_exception(BrokenExecutor())
             return future
 
-    pool = _LocalPool(Ending(1), cast(Any, None), 1)
+    pool = LocalPool(Ending(1), cast(Any, None), 1)
     pool.submit(0, np.zeros(1))
     with pytest.raises(OsimliteError, match="begins a sweep under if __name__ == '__main__':"):
         pool.result()

@@ -156,12 +156,12 @@ class CasadiModel(StatedModel):
 
     def _engine_order(self, name: str) -> list[Any]:
         result: list[Any] = [0.0] * len(self.states)
-        for place, entry in zip(self._places, self._entries(name), strict=True):
+        for place, entry in zip(self.state_indices, self._entries(name), strict=True):
             result[place] = entry
         return result
 
     def _in_order(self, y: Sequence[Any]) -> list[Any]:
-        return [y[place] for place in self._places]
+        return [y[place] for place in self.state_indices]
 
     @cached_property
     def _evaluated(self) -> Evaluated:
@@ -218,7 +218,7 @@ class CasadiModel(StatedModel):
 
     def _speed_place(self, k: int) -> int:
         """Number among `coordinates` of a degree of freedom."""
-        return self._places.index(k)
+        return self.state_indices.index(k)
 
     def generalized_forces(self, pushing: Collection[str]) -> Any:
         """``generalized_forces(t, x, xdot, u, p) -> missing``: M udot + c less what gravity and some forces push.
@@ -292,7 +292,7 @@ class CasadiModel(StatedModel):
             return {"position": nothing, "velocity": nothing, "acceleration": nothing, "jacobian": empty}
         found, structure = self._traced.bound(), self._traced.structure
         h, data = structure[structure[MODEL.CONSTRAINED] :], found.data
-        order = [self._places.index(k) for k in range(size)]
+        order = [self.state_indices.index(k) for k in range(size)]
         rows = []
         for number in range(count):
             first = h[CONSTRAINED.WORK_ROWS] + size * number

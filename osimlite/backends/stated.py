@@ -62,13 +62,13 @@ class StatedModel:
         self.states = (*values, *speeds, *in_model_order(model, paths))
         self.in_system = (*own, *paths)
         names = {name: place for place, name in enumerate(self.in_system)}
-        self._places = [names[name] for name in self.states]
+        self.state_indices = [names[name] for name in self.states]
         self.controls = self.forces.controls.names
         self.u = np.zeros(len(self.controls))
         start, rates = kept_state(
             self.mechanism, [i.default_value for i in infos], [i.default_speed for i in infos], (), ()
         )
-        self.x = np.array(self._state.pack(start.tolist(), rates.tolist()))[self._places]
+        self.x = np.array(self._state.pack(start.tolist(), rates.tolist()))[self.state_indices]
         self._parameters = Parameters(model.copy_deep(), self.parameters, self._numbers_of) if parameters else None
         self.p = self._parameters.values if self._parameters else np.zeros(0)
         at_equations = self._packed.structure[MODEL.CONSTRAINED]

@@ -148,17 +148,17 @@ class TangentModel(StatedModel):
             look: called after each evaluation, with the directions that it had and their places behind a number.
         """
         machine, y, f = self._machine, self._y, self._f
-        y[self._places, 0], self._driven[:, 0] = x, u
+        y[self.state_indices, 0], self._driven[:, 0] = x, u
         rates, result = np.full(len(x), np.nan), np.full(dx.shape, np.nan)
         for part, own in batches(dx.shape[1]):
             machine.begin(t)
-            y[self._places, own] = dx[:, part]
+            y[self.state_indices, own] = dx[:, part]
             if du is not None:
                 self._driven[:, own] = du[:, part]
             if dp is not None:
                 self.put_along(dp[:, part], machine.x[:, own])
             if self._evaluate(STAGE.ACCELERATION) == OUTCOME.OK:
-                rates, result[:, part] = f[self._places, 0], f[self._places, own]
+                rates, result[:, part] = f[self.state_indices, 0], f[self.state_indices, own]
                 if look is not None:
                     look(part, own)
         if dp is not None:
@@ -249,7 +249,7 @@ class TangentModel(StatedModel):
     def steps(self, controls: Controls, dp: Array) -> Steps:
         """What follows a motion that controls drive, along directions of the parameters (p, m) and of the start."""
         packed = pack(self.mechanism, replace(self.forces, controls=controls), apart=self._apart)
-        result, numbers = Steps(packed, self.forces, self._places), packed.numbers.copy()
+        result, numbers = Steps(packed, self.forces, self.state_indices), packed.numbers.copy()
         changes = np.zeros((len(numbers), dp.shape[1]))
         self.put(numbers)
         self.put_along(dp, changes)
@@ -289,7 +289,7 @@ class Steps:
     """
 
     def __init__(self, packed: Packed, forces: Forces, places: Sequence[int]) -> None:
-        size, self._places = len(places), places
+        size, self.state_indices = len(places), places
         method, first = int(packed.structure[MODEL.WORK_SIZE]), int(packed.structure[MODEL.WORK_STATE])
         # Where constraints bind the motion, no step is good enough to be projected.
         self._accepted = -1.0 if packed.structure[MODEL.CONSTRAINED] else np.inf
@@ -309,14 +309,14 @@ class Steps:
     def blocks(self, y: Array, slopes: Array) -> Array:
         """Of a state (x,) with its derivatives (x, m), in the order of the model."""
         result = np.zeros((len(self._numbers), len(y), 1 + DIRECTIONS))
-        result[:, self._places, 0] = y
+        result[:, self.state_indices, 0] = y
         for block, (part, own) in zip(result, batches(slopes.shape[1]), strict=True):
-            block[self._places, own] = slopes[:, part]
+            block[self.state_indices, own] = slopes[:, part]
         return result
 
     def slopes(self, blocks: Array) -> Array:
         """The derivatives (x, m) in blocks."""
-        parts = [block[self._places, own] for block, (_, own) in zip(blocks, batches(self._count), strict=True)]
+        parts = [block[self.state_indices, own] for block, (_, own) in zip(blocks, batches(self._count), strict=True)]
         return np.hstack(parts)
 
     def step(self, t0: float, t1: float, start: Array) -> tuple[Array, Array]:

@@ -47,7 +47,7 @@ def app(names: Sequence[str] = COMMANDS) -> Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     for name in names:
-        command = _loaded(name)
+        command = load_command(name)
         application.command(name, help=_flowing(command.__doc__ or ""))(command)
 
     @application.callback(invoke_without_command=True)
@@ -62,7 +62,8 @@ def app(names: Sequence[str] = COMMANDS) -> Typer:
     return application
 
 
-def _loaded(name: str) -> Command:
+def load_command(name: str) -> Command:
+    """Return the command of a name, importing its module."""
     function = name.replace("-", "_")
     return getattr(import_module(f"osimlite.cli.{function}"), function)
 
@@ -159,7 +160,7 @@ def _run(words: list[str]) -> None:
             # Options refuse such a number, or were given its unit.
             warnings.simplefilter("ignore", UnitWarning)
             if names != COMMANDS and COMPLETING not in os.environ:
-                command = _loaded(words[0])
+                command = load_command(words[0])
                 words = [words[0], *command.complete(words[1:])]
                 given = command.read(words[1:])
                 if given is not None:

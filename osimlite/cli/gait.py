@@ -90,7 +90,7 @@ def gait(
         )
         engine: Any = simulation.engine
         basin_places(engine, basin_x, basin_y)
-        result, step_map = _walk(engine, state, foot, to, settle, accuracy)
+        result, step_map = simulate_walk(engine, state, foot, to, settle, accuracy)
         result.skipped = simulation.forces.skipped
         cycle = result.cycle
         if step_map is not None and cycle is not None:
@@ -148,7 +148,7 @@ class GaitReport:
     skipped: Sequence[str] = ()  # forces that were left out
 
 
-def _walk(
+def simulate_walk(
     engine: BatchEngine, state: Sequence[float], feet: Sequence[str] | None, to: float, settle: int, accuracy: float
 ) -> tuple[GaitReport, StepMap | None]:
     """The walk from a state and the cycle near it, with the step map that has it as a fixed point."""

@@ -103,7 +103,7 @@ def simulate(
             how = "stopped" if is_failure else "interrupted"
             # After many steps, it takes a while to work out what is written.
             complain(f"{how} at {trajectory.times[-1]:.6g} s of {to:g} s; what was recorded goes into '{results}'")
-            _told(trajectory, _write(trajectory, results)).show()
+            _told(trajectory, write_files(trajectory, results)).show()
             if is_failure:
                 raise
             raise SystemExit(130) from None
@@ -116,7 +116,7 @@ def simulate(
                 wrapping = chosen["wrapping"]
                 return draw(model, trajectory, path, folders=folders, file=file, wrapping=wrapping, progress=bar)
 
-        files = _write(trajectory, results, plot=plot, film=film if animate else None)
+        files = write_files(trajectory, results, plot=plot, film=film if animate else None)
         _told(trajectory, files).show()
         simulation.hold()
 
@@ -128,7 +128,7 @@ SOME = {
 """What not every simulation writes: --plot and --animate draw pictures."""
 
 
-def _write(
+def write_files(
     trajectory: Trajectory, folder: Path, *, plot: bool = False, film: Callable[[Path], Path] | None = None
 ) -> list[Path]:
     """Write everything beside its place first, so that a failure leaves nothing behind."""

@@ -85,7 +85,7 @@ def translate(
     written = made.write(options.results_folder(file, output))
 
     if len(made.fidelity):
-        plain_console().print(_table(made.fidelity, to.upper()))
+        plain_console().print(tabulate(made.fidelity, to.upper()))
     robot, (same, otherwise, lost) = made.robot, made.fidelity.counts()
     say(f"{same} components as they are, {otherwise} in another way, {lost} left out")
     say(
@@ -100,7 +100,7 @@ def translate(
         check_mjcf(file, written[0], options.results_folder(file, output))
 
 
-def _table(fidelity: Fidelity, target: str) -> Any:
+def tabulate(fidelity: Fidelity, target: str) -> Any:
     """What is lost, one row for all components of which the same is said."""
     table = plain_table(f"What {target} cannot say of {fidelity.model}", padding=(0, 2, 1, 0))
     table.add_column("what", overflow="fold", ratio=4)

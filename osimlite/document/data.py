@@ -31,7 +31,7 @@ from osimlite.text import did_you_mean
 SUFFIXES = (".json", ".yaml", ".yml")
 """How the names of data files end."""
 
-_MOST_NUMBERS = 2_000_000
+MAX_NUMBERS = 2_000_000
 """More than any real model has, an object counted as ten; the aliases of a short YAML text can make it endless."""
 
 
@@ -248,7 +248,7 @@ class _Reader:
 
     def _counted(self, weight: int = 1) -> None:
         self.count += weight
-        if self.count > _MOST_NUMBERS:
+        if self.count > MAX_NUMBERS:
             raise ModelError("the data has more values than any model; its aliases may repeat it endlessly")
 
 

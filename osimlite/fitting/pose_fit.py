@@ -89,19 +89,19 @@ class PoseFit:
         # A goal of a coordinate that cannot move changes nothing.
         self._goals = [number for number, goal in enumerate(goals) if goal.coordinate not in fixed]
         unlocked = replace(mechanism, coordinates=tuple(infos), constraints=tuple(others))
-        self._system = _System(unlocked, Forces(()), code=code)
-        self.order = list(self._system.order)
-        places = Places(unlocked, {place: k for k, place in enumerate(self.order)}, self._system.placements)
+        self.system = _System(unlocked, Forces(()), code=code)
+        self.order = list(self.system.order)
+        places = Places(unlocked, {place: k for k, place in enumerate(self.order)}, self.system.placements)
         kept = [goals[number] for number in self._goals]
-        self._shape = FitLayout(self._system, places, markers, sensors, kept, list(self._held), self._couplers)
-        self._history = self._shape.work[self._shape.ints[fit.HISTORY] :]
+        self.layout = FitLayout(self.system, places, markers, sensors, kept, list(self._held), self._couplers)
+        self._history = self.layout.work[self.layout.ints[fit.HISTORY] :]
         self.width = self.measured + len(kept) + len(self._held)
         self.sensors, self.found = len(sensors), len(self.order) + 3 * (len(markers) + len(sensors)) + 3
 
     def start(self, q: Array) -> None:
         """Begin anew, at the values (n,) of all coordinates."""
         self._history[0] = 0.0
-        self._system.start(q)
+        self.system.start(q)
 
     def fit(self, measured: Array, times: Sequence[float] | Array | None = None, q: Array | None = None) -> Poses:
         """Fit frames (t, ...) of what is measured, from the pose that was found last on.
@@ -136,8 +136,8 @@ class PoseFit:
 
     def bound(self, frames: Array, found: Array) -> Callable[[int], int]:
         """What fits a number of frames of arrays that the caller keeps, as the kernel takes them."""
-        shape = self._shape
-        return self._system.bound(shape.ints, shape.numbers, shape.work, frames, found)
+        shape = self.layout
+        return self.system.bound(shape.ints, shape.numbers, shape.work, frames, found)
 
     def fill_held(self, frames: Array, moments: Array) -> None:
         """Put the values of what is held at some times (t,), s, into rows (t, width) for the kernel."""

@@ -111,7 +111,7 @@ def key_of(file: str, config: Config) -> str:
     severity = sorted((word, str(level)) for word, level in config.severity.items())
     thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
     setting = (
-        _code(), file, os.getcwd(), config.select, config.ignore, severity, config.mesh_paths, thresholds,
+        digest_of_code(), file, os.getcwd(), config.select, config.ignore, severity, config.mesh_paths, thresholds,
         [(path, stamped(path)) for path in config.classes], config.target_version, absent("numpy"),
     )  # fmt: skip
     return ascii(setting)
@@ -137,7 +137,7 @@ def _stamp_since(file: str, moment: int) -> list[int] | None:
 
 
 @cache
-def _code() -> str:
+def digest_of_code() -> str:
     """Which code this is. In a working copy the version stays the same while rules change: the files then tell.
 
     What is installed changes as a whole.

@@ -96,11 +96,12 @@ class Texts(dict[str, str]):
 
 def settings_of(file: str) -> Settings:
     """The settings that hold for a file; for standard input those of the working folder."""
-    return settings_for(Path.cwd() if file in ("-", "<stdin>") else _resolved(os.path.dirname(file)))
+    return settings_for(Path.cwd() if file in ("-", "<stdin>") else resolve_folder(os.path.dirname(file)))
 
 
 @cache
-def _resolved(folder: str) -> Path:
+def resolve_folder(folder: str) -> Path:
+    """Return the absolute path of a folder without links."""
     return Path(folder).resolve()
 
 
@@ -108,7 +109,7 @@ def _checked(jobs: list[Job], processes: int | None) -> Iterator[tuple[Job, Repo
     if not jobs:
         return
     if processes is None:
-        processes = _processes(jobs)
+        processes = count_processes(jobs)
     if processes < 2:
         yield from ((job, check_one(job)) for job in jobs)
         return
@@ -127,7 +128,8 @@ def _checked(jobs: list[Job], processes: int | None) -> Iterator[tuple[Job, Repo
         yield from zip(jobs, pool.map(check_one, jobs, chunksize=share), strict=True)
 
 
-def _processes(jobs: list[Job]) -> int:
+def count_processes(jobs: list[Job]) -> int:
+    """Return how many processes are worth starting for files of these sizes."""
     size = 0
     for job in jobs:
         try:

@@ -46,7 +46,7 @@ class Known(NamedTuple):
         return of_owners(self.measures, {path for path, own in self.paths.items() if parts.paths.get(path) == own})
 
 
-_memory: OrderedDict[str, Known] = OrderedDict()
+remembered: OrderedDict[str, Known] = OrderedDict()
 
 
 def parts_of(subject: Subject) -> Parts | None:
@@ -84,7 +84,7 @@ def recall(parts: Parts, folder: Path | None) -> Known | None:
         parts: of the text.
         folder: where it may be kept.
     """
-    known = _memory.get(parts.rest)
+    known = remembered.get(parts.rest)
     if known is None and folder is not None:
         from pydantic import TypeAdapter, ValidationError
 
@@ -92,7 +92,7 @@ def recall(parts: Parts, folder: Path | None) -> Known | None:
             known = TypeAdapter(Known).validate_json(read_file(_file(folder, parts)), strict=True)
         except (OsimliteError, ValidationError):
             return None
-        _memory[parts.rest] = known
+        remembered[parts.rest] = known
     return known
 
 
@@ -104,10 +104,10 @@ def remember(parts: Parts, measures: Measures, folder: Path | None) -> None:
         measures: of its model.
         folder: where it is kept; in memory alone if None.
     """
-    known = _memory[parts.rest] = Known(parts.paths, measures)
-    _memory.move_to_end(parts.rest)
-    while len(_memory) > KEPT:
-        _memory.popitem(last=False)
+    known = remembered[parts.rest] = Known(parts.paths, measures)
+    remembered.move_to_end(parts.rest)
+    while len(remembered) > KEPT:
+        remembered.popitem(last=False)
     if folder is not None:
         from pydantic import ConfigDict, TypeAdapter
 

@@ -80,7 +80,7 @@ class Scan:
                         self._take(lines[part], forms[part], line + places[0], zeros)
                     elif kind is False:
                         for place in places:
-                            self._odd(lines[place], line + place)
+                            self.report_odd_line(lines[place], line + place)
                     elif self.rows.count:
                         self._note("blank", 0, line + places[0], 0, b"", times=len(places))
             line += len(lines)
@@ -152,7 +152,7 @@ class Scan:
             return list(map(read, text.replace(b",", b" ").split()))
         return [read(cell.strip() or b"nan") for cell in text.split(b"\t")]
 
-    def _odd(self, text: bytes, line: int) -> None:
+    def report_odd_line(self, text: bytes, line: int) -> None:
         """Look at one row that is not good."""
         # A byte for each character, so that places are those of characters.
         text = text.decode("utf-8", "replace").encode("latin-1", "replace").rstrip(b"\r")

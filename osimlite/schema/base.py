@@ -145,6 +145,11 @@ class Object(BaseModel, metaclass=ObjectType):
         return field_specs(cls)
 
     @property
+    def source_index(self) -> Any:
+        """Index of the element that this object was read from among all elements of its text; None without a text."""
+        return self._index
+
+    @property
     def layout(self) -> Layout | None:
         """What the file said about this object beyond its properties."""
         return cast("Layout | None", self._layout)

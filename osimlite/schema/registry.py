@@ -181,7 +181,7 @@ MODULES = {name: f"osimlite.schema.{area}" for area, names in _AREAS.items() for
 
 
 _further: dict[str, type[Object]] = {}
-_forget: list[Callable[[], None]] = []
+callbacks_of_changes: list[Callable[[], None]] = []
 
 
 def further_classes() -> Mapping[str, type[Object]]:
@@ -194,13 +194,13 @@ def let_count(classes: Mapping[str, type[Object]]) -> None:
     if classes != _further:
         _further.clear()
         _further.update(classes)
-        for forget in _forget:
+        for forget in callbacks_of_changes:
             forget()
 
 
 def forgotten_with_classes(forget: Callable[[], None]) -> None:
     """Call a function whenever other classes count than before."""
-    _forget.append(forget)
+    callbacks_of_changes.append(forget)
 
 
 def by_tags(function: Callable[..., T]) -> Callable[..., T]:

@@ -57,22 +57,22 @@ class Copies:
         self.places = places_of(engine, driven)
         options = BatchOptions(to=step, accuracy=accuracy, integrator=integrator, step_bounds=(0.0, longest))
         options.check()
-        self._batch = Batch(engine, np.tile(self.start, (count, 1)), options, start_holds=True)
-        self._first_step = float(self._batch.clocks[0, 1])
+        self.batch = Batch(engine, np.tile(self.start, (count, 1)), options, start_holds=True)
+        self._first_step = float(self.batch.clocks[0, 1])
         self._parts = [(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE)]
         # Each core works on numbers of the model of its own, which are few enough to be near.
-        self._rooms = [(self._batch.room(), engine.numbers.copy()) for _ in range(min(cores(), count))]
+        self._rooms = [(self.batch.room(), engine.numbers.copy()) for _ in range(min(cores(), count))]
         self._pool = ThreadPoolExecutor(len(self._rooms) - 1) if len(self._rooms) > 1 else None
 
     @property
     def states(self) -> Array:
         """Of all copies (w, y)."""
-        return self._batch.states
+        return self.batch.states
 
     def put(self, which: Any, states: Array) -> None:
         """Have copies be in other states."""
-        self._batch.states[which] = states
-        self._batch.clocks[which, 1] = self._first_step
+        self.batch.states[which] = states
+        self.batch.clocks[which, 1] = self._first_step
 
     def step(self, controls: Array) -> NDArray[np.bool_]:
         """Hold controls (w, c) for a step; which of the copies (w,) could go on to its end."""
@@ -98,7 +98,7 @@ class Copies:
 
         def share(room: Floats, numbers: Floats) -> None:
             for first, last in left:
-                said.append(self._batch.hold(law, room, numbers, *given, first, last))
+                said.append(self.batch.hold(law, room, numbers, *given, first, last))
 
         others = [] if self._pool is None else [self._pool.submit(share, *room) for room in self._rooms[1:]]
         try:

@@ -108,4 +108,4 @@ class SemiImplicitEuler(Stepper):
 
     def interpolant(self) -> Callable[[float], list[float]]:
         """The straight line between the ends of the last step."""
-        return partial(straight_line, *self._previous[:2], self.time, self.state)
+        return partial(straight_line, *self.previous[:2], self.time, self.state)

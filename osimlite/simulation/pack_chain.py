@@ -46,7 +46,7 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
         ("JOINTS", "JOINT_AT"): (JOINT.SIZE, records),
         ("SHARES", "SHARE_AT"): (SHARE.SIZE, parts),
         ("PRODUCTS", "PRODUCT_AT"): (PRODUCT.SIZE, _products(packer, shares, count)),
-        ("EXCESSES", "EXCESS_AT"): (EXCESS.SIZE, _excesses(packer, chain.excess)),
+        ("EXCESSES", "EXCESS_AT"): (EXCESS.SIZE, list_excesses(packer, chain.excess)),
     }
     places: dict[str, int] = {}
     for (length, place), (each, numbers) in lists.items():
@@ -100,7 +100,7 @@ def _products(packer: Packer, shares: Sequence[tuple[int, int]], count: int) -> 
     return result
 
 
-def _excesses(packer: Packer, excess: Sequence[tuple[int, float]]) -> list[int]:
+def list_excesses(packer: Packer, excess: Sequence[tuple[int, float]]) -> list[int]:
     """Link, last degree of freedom on the way to it, and place of the number."""
     result: list[int] = []
     for body, moment in excess:

@@ -74,7 +74,7 @@ class Stepper(ABC):
         self.taken = 0
         if len(self.derivative) != len(self.state):
             raise ValueError(f"f gives {len(self.derivative)} derivatives of {len(self.state)} states")
-        self._previous = t, self.state, self.derivative
+        self.previous = t, self.state, self.derivative
 
     @property
     def name(self) -> str:
@@ -120,7 +120,7 @@ class Stepper(ABC):
                 while self.time < t:
                     self.step(times[-1])
                     if progress is not None:
-                        progress(self.time, self.time - self._previous[0])
+                        progress(self.time, self.time - self.previous[0])
                 rows.append(self.at(t))
         except (KeyboardInterrupt, SimulationError) as ended:
             self.ended = ended
@@ -132,14 +132,14 @@ class Stepper(ABC):
         """State at a time not before the start of the last step nor after its end, s."""
         if t == self.time:
             return self.state
-        start = self._previous[0]
+        start = self.previous[0]
         if not start <= t < self.time:
             raise ValueError(f"t = {t:.9g} s is outside the last step, {start:.9g} to {self.time:.9g} s")
         return self.interpolant()(t)
 
     def _advance(self, t: float, y: list[float]) -> None:
         """Make (t, y) the present state."""
-        self._previous = self.time, self.state, self.derivative
+        self.previous = self.time, self.state, self.derivative
         self.derivative = self._evaluate(t, y)
         self.time = t
         self.state = y

@@ -332,16 +332,22 @@ class System:
 
     def places_of(self, path: str, names: Iterable[str]) -> list[int]:
         """Where the work vector has what is known of an element, by the names of its kind."""
-        known = self._kind_at(path).known_of
+        known = self.kind_at(path).known_of
         return [self._records_at[path] + known[name] for name in names]
 
     def knows(self, path: str, name: str) -> bool:
         """Whether that is known of an element."""
-        return name in self._kind_at(path).known_of
+        return name in self.kind_at(path).known_of
 
-    def _kind_at(self, path: str) -> Any:
+    def kind_at(self, path: str) -> Any:
+        """Return the declaration of the force at this path."""
         element: Any = next(item for item in self.forces.elements if item.path == path)
         return element.kind
+
+    @property
+    def work_vector(self) -> Floats:
+        """The numbers that the kernels leave, laid out as `kernels/layout.py` says."""
+        return self._w
 
     @property
     def room(self) -> int:
@@ -397,7 +403,7 @@ class System:
         for name in names:
             item, path, strength = items[name], -1, -1
             if self.knows(name, STRENGTH):
-                path = item - int(self.structure[item + ITEM.OWN + self._kind_at(name).text.heads])
+                path = item - int(self.structure[item + ITEM.OWN + self.kind_at(name).text.heads])
                 (strength,) = self.places_of(name, (STRENGTH,))
             order += item, controls[name], path, strength
         given, result = np.hstack([moments, udot]), np.empty((len(moments), size + len(names) * (size + 1)))
@@ -445,7 +451,7 @@ class System:
         """One number for each of the columns."""
         self.applied(t, y)
         origins = [self._origin(body) for body in range(len(self.placements))] + [(0.0, 0.0, 0.0)]
-        return [value for element, records in self._records() for value in element.report(records, origins)]
+        return [value for element, records in self.read_records() for value in element.report(records, origins)]
 
     def force_table(self, times: Sequence[float] | Floats, states: Sequence[Sequence[float]] | Floats) -> Floats:
         """Return one row of the columns for each moment, with all moments evaluated in one call of the kernels.
@@ -504,12 +510,12 @@ class System:
         self.applied(t, y)
         kinetic, gravity = self._mechanical()
         gravity -= sum(float(mass * self.mechanism.gravity @ center) for mass, center in self.masses_in_ground)
-        return kinetic, gravity, float(sum(element.energy(records) for element, records in self._records()))
+        return kinetic, gravity, float(sum(element.energy(records) for element, records in self.read_records()))
 
     def energy_of(self, path: str, t: float, y: Sequence[float]) -> float:
         """Energy stored in one force, J; none in one that does not act."""
         self.applied(t, y)
-        return float(sum(element.energy(records) for element, records in self._records() if element.path == path))
+        return float(sum(element.energy(records) for element, records in self.read_records() if element.path == path))
 
     def _mechanical(self) -> tuple[float, float]:
         """Kinetic energy and potential energy of gravity of all links, after an evaluation."""
@@ -550,7 +556,7 @@ class System:
         places = [first + size * link + number for link in chosen for number in range(size)]
         return self.looked(moments, places, STAGE.VELOCITY).reshape(len(moments), len(chosen), size)
 
-    def _records(self) -> Iterator[tuple[ForceElement, list[list[float]]]]:
+    def read_records(self) -> Iterator[tuple[ForceElement, list[list[float]]]]:
         """Each element with the records of its items, after an evaluation."""
         work = self._w.tolist()
         for element, items in zip(self.forces.elements, self._items, strict=True):

@@ -113,7 +113,7 @@ def _count(workers: int | None) -> int:
     return workers or cores()
 
 
-class _LocalPool:
+class LocalPool:
     """An executor whose finished work queues up."""
 
     task_seconds = 0.25
@@ -153,7 +153,7 @@ def _losses_told() -> Iterator[None]:
         ) from None
 
 
-class ThreadPool(_LocalPool):
+class ThreadPool(LocalPool):
     """Threads: the compiled engine lets them run side by side."""
 
     def __init__(self, plan: Plan, count: int) -> None:
@@ -170,7 +170,7 @@ class ThreadPool(_LocalPool):
         super().__init__(executor, lambda values: _thread_runner(plan).run(values), count)
 
 
-class ProcessPool(_LocalPool):
+class ProcessPool(LocalPool):
     """Processes, for what keeps Python's lock."""
 
     def __init__(self, work: Callable[[Any], Any], count: int) -> None:

@@ -32,7 +32,7 @@ KEY = b"osimlite"
 ROWS_PER_GROUP = 65536
 """Of the Parquet file."""
 
-_HEAD = struct.Struct("<4sQ16s")
+HEAD = struct.Struct("<4sQ16s")
 _MARK = b"OSB1"
 """What a record of the partial file begins with; then the length and the checksum of the rest follow."""
 
@@ -158,7 +158,7 @@ class Partial:
         try:
             self._lock = _locked(self.partial)
             try:
-                self._stream = open_to_append(self.partial)
+                self.stream = open_to_append(self.partial)
                 if is_there:
                     self._reopen()
                 else:
@@ -197,8 +197,8 @@ class Partial:
 
     def _put(self, item: Any) -> None:
         body = item.serialize().to_pybytes()
-        self._stream.write(_HEAD.pack(_MARK, len(body), _checksum(body)) + body)
-        self._stream.flush()
+        self.stream.write(HEAD.pack(_MARK, len(body), _checksum(body)) + body)
+        self.stream.flush()
 
     def finish(self) -> Path:
         """Make the Parquet file of it, which appears whole; without rows there is none."""
@@ -206,7 +206,7 @@ class Partial:
             return self.path
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
         pa = _arrow()
-        self._stream.close()
+        self.stream.close()
         beside = self.path.with_name(f".{self.path.name}.{os.getpid()}")
         waiting: list[Any] = []
         try:
@@ -245,7 +245,7 @@ class Partial:
     def _let_go(self, *, removing: bool = False) -> None:
         with suppress(OSError, AttributeError):
             # What was lost to a full disk has been told of; and there may be no stream yet.
-            self._stream.close()
+            self.stream.close()
         if removing:
             # Windows removes no file that is open, and others may write one as soon as the lock is gone.
             self.partial.unlink(missing_ok=True)
@@ -312,8 +312,8 @@ def _locked(path: Path) -> Any:
 def _records(path: Path) -> Iterator[tuple[bytes, int]]:
     """The records of a partial file as far as they are whole, and where each ends."""
     with open_file(path) as stream:
-        while len(head := stream.read(_HEAD.size)) == _HEAD.size:
-            mark, length, checksum = _HEAD.unpack(head)
+        while len(head := stream.read(HEAD.size)) == HEAD.size:
+            mark, length, checksum = HEAD.unpack(head)
             # A damaged length may be that of no memory.
             if mark != _MARK or length > path.stat().st_size:
                 return

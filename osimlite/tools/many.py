@@ -216,7 +216,7 @@ class _Journal:
         with suppress(OsimliteError):
             lines = read_file(self.path).splitlines() if resume else []
         for line in lines:
-            if (trial := _read_trial(line)) is not None:
+            if (trial := read_trial(line)) is not None:
                 self.noted[trial.setup] = trial
 
     def done(self, setup: Path) -> Trial | None:
@@ -252,7 +252,7 @@ class _Journal:
                 self.save()
 
 
-def _read_trial(line: bytes) -> Trial | None:
+def read_trial(line: bytes) -> Trial | None:
     """Return the trial of one line of a journal; None if the line is damaged, so that it is done again."""
     try:
         match json.loads(line):

@@ -89,7 +89,7 @@ def animate(
     scene = build_scene(
         model, build_mechanism(model), MeshFolders(None if file is None else file.parent, folders), wrapping
     )
-    film = _Film(scene, trajectory, fps, speed, plane)
+    film = Film(scene, trajectory, fps, speed, plane)
     painter = _Painter(film, size)
     frames = []
     for number in range(len(film.times)):
@@ -118,7 +118,7 @@ def _encoded(frames: list[Any], fps: int, image: Any) -> bytes:
     return out.getvalue()
 
 
-class _Film:
+class Film:
     """The motion at the moments of the film, and how much of space it takes."""
 
     def __init__(self, scene: Scene, motion: Motion, fps: int, speed: float, plane: Plane) -> None:
@@ -190,7 +190,7 @@ class _Film:
 class _Painter:
     """Draws one frame after the other."""
 
-    def __init__(self, film: _Film, size: tuple[int, int]) -> None:
+    def __init__(self, film: Film, size: tuple[int, int]) -> None:
         self.film, self.size = film, size
         self.pen = require("PIL.ImageDraw", extra="view", purpose="an animation")
         fonts = require("PIL.ImageFont", extra="view", purpose="an animation")
@@ -216,15 +216,15 @@ class _Painter:
 
     def _words(self, pen: Any, number: int) -> None:
         width, height = self.size
-        ink, force, sky = (_hex(color) for color in (INK, FORCE, SKY))
+        ink, force, sky = (to_hex(color) for color in (INK, FORCE, SKY))
         style = {"font": self.font, "fill": ink, "stroke_width": 3, "stroke_fill": sky}
         pen.text((0.03 * width, 0.03 * height), f"t = {self.film.times[number]:.2f} s", **style)
         pen.text((0.97 * width, 0.03 * height), self.film.mechanism.name, anchor="ra", **style)
         pixels = 0.5 * width / self.half[0]
-        length = _round_down(0.4 * self.half[0])
+        length = round_down(0.4 * self.half[0])
         self._bar(pen, 0.03 * width, length * pixels, f"{length:g} m", ink)
         if self.meters_per_newton > 0.0:
-            newtons = _round_down(0.4 * self.half[0] / self.meters_per_newton)
+            newtons = round_down(0.4 * self.half[0] / self.meters_per_newton)
             long = newtons * self.meters_per_newton * pixels
             self._bar(pen, 0.97 * width - long, long, f"{newtons:g} N", force)
 
@@ -232,14 +232,15 @@ class _Painter:
         y = 0.95 * self.size[1]
         pen.line((x, y, x + length, y), fill=color, width=max(3, round(self.size[1] / 120)))
         middle = x + 0.5 * length, y - 0.015 * self.size[1]
-        pen.text(middle, text, anchor="mb", font=self.small, fill=color, stroke_width=3, stroke_fill=_hex(SKY))
+        pen.text(middle, text, anchor="mb", font=self.small, fill=color, stroke_width=3, stroke_fill=to_hex(SKY))
 
 
-def _hex(color: tuple[float, ...]) -> str:
+def to_hex(color: tuple[float, ...]) -> str:
+    """Return a colour as #rrggbb."""
     return "#" + "".join(f"{round(255 * part):02x}" for part in color)
 
 
-def _round_down(value: float) -> float:
+def round_down(value: float) -> float:
     """The largest of 1, 2, 5 times a power of ten that is not above a positive value."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1 + 1e-9)))

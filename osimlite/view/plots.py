@@ -63,7 +63,7 @@ def plot_simulation(trajectory: Motion, folder: str | Path, *, mechanism: Mechan
     make_folder(base)
     written = []
     with plain_lettering():
-        for name, figure in _figures(trajectory, known):
+        for name, figure in draw_figures(trajectory, known):
             written.append(save(figure, base / name))
     return written
 
@@ -95,7 +95,8 @@ def energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[str, Arr
     return times[places], {"kinetic": kinetic, "potential of gravity": height}
 
 
-def _figures(motion: Motion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
+def draw_figures(motion: Motion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
+    """Yield file name and figure of each plot of a motion."""
     times = np.asarray(motion.times, dtype=float)
     yield "coordinates.png", _coordinates(times, motion, mechanism)
     states = getattr(motion, "auxiliary", {})

@@ -104,7 +104,7 @@ def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
         OsimliteError: none has a motion, or the file cannot be written.
         MissingDependency: matplotlib is not installed.
     """
-    trials = _trials(outcomes)
+    trials = collect_trials(outcomes)
     if all(trial.evidence is None for trial in trials):
         raise OsimliteError("there is nothing to report: none of the setups has a motion")
     with plain_lettering():
@@ -119,7 +119,8 @@ def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
     return Path(path)
 
 
-def _trials(outcomes: Mapping[str | Path, Outcome]) -> list[Trial]:
+def collect_trials(outcomes: Mapping[str | Path, Outcome]) -> list[Trial]:
+    """Group the outcomes of tools by the folder of their trial."""
     by_folder: dict[Path, list[Outcome]] = {}
     for setup, outcome in outcomes.items():
         by_folder.setdefault(Path(setup).resolve().parent, []).append(outcome)
@@ -137,10 +138,10 @@ def _parts(trials: Sequence[Trial]) -> Iterator[str]:
         if trial.evidence is not None:
             yield _viewer(trial.evidence)
     shown = [trial for trial in trials if trial.evidence is not None]
-    yield from _section("Joint angles", _angles(shown))
-    yield from _section("Joint moments", _moments(shown))
-    yield from _section("Controls", _controls(shown))
-    yield from _section("Contact forces", _contacts(shown))
+    yield from _section("Joint angles", collect_angles(shown))
+    yield from _section("Joint moments", collect_moments(shown))
+    yield from _section("Controls", collect_controls(shown))
+    yield from _section("Contact forces", collect_contacts(shown))
     for trial in shown:
         name = f": {trial.name}" if len(shown) > 1 else ""
         yield from _residuals(trial, name)
@@ -202,7 +203,7 @@ def _motion(evidence: Evidence, mechanism: Mechanism, measured: MeasuredMarkers 
     )
 
 
-def _angles(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
+def collect_angles(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
     """Lines by coordinate without its side, angles in degrees."""
     panels: dict[str, list[_Line]] = {}
     for number, trial in enumerate(trials):
@@ -219,7 +220,7 @@ def _angles(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
     return panels
 
 
-def _moments(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
+def collect_moments(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
     """Lines of generalized forces, those at the root left out."""
     panels: dict[str, list[_Line]] = {}
     for number, trial in enumerate(trials):
@@ -237,7 +238,7 @@ def _moments(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
     return panels
 
 
-def _controls(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
+def collect_controls(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
     """Lines by control without its side."""
     panels: dict[str, list[_Line]] = {}
     for number, trial in enumerate(trials):
@@ -253,7 +254,7 @@ def _controls(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
     return panels
 
 
-def _contacts(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
+def collect_contacts(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
     """Lines by axis of what pushes each side."""
     panels: dict[str, list[_Line]] = {}
     for number, trial in enumerate(trials):

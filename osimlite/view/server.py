@@ -41,16 +41,16 @@ class PageServer:
 
     def __init__(self, page: str, mechanism: Mechanism, port: int = 0) -> None:
         try:
-            self._server = _QuietServer((HOST, port), _handler(page.encode(), mechanism, PATIENCE))
+            self.server = _QuietServer((HOST, port), _handler(page.encode(), mechanism, PATIENCE))
         except (OSError, OverflowError) as error:
             raise OsimliteError(f"cannot listen at port {port}: {error}; choose another one by --port") from None
-        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
+        self._thread = threading.Thread(target=self.server.serve_forever, daemon=True)
         self._thread.start()
 
     @property
     def url(self) -> str:
         """Where the page is."""
-        return f"http://{HOST}:{self._server.server_address[1]}/"
+        return f"http://{HOST}:{self.server.server_address[1]}/"
 
     def wait(self) -> None:
         """Serve until the program is interrupted."""
@@ -59,8 +59,8 @@ class PageServer:
 
     def close(self) -> None:
         """Stop serving."""
-        self._server.shutdown()
-        self._server.server_close()
+        self.server.shutdown()
+        self.server.server_close()
         self._thread.join()
 
     def __enter__(self) -> PageServer:

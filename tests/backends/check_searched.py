@@ -25,11 +25,11 @@ def kernel_of(model, functions):
 
     def derivative(x, u):
         y = [0.0] * len(x)
-        for place, value in zip(functions._places, x.tolist(), strict=True):
+        for place, value in zip(functions.state_indices, x.tolist(), strict=True):
             y[place] = value
         driven = {name: Constant(value) for name, value in zip(functions.controls, u.tolist(), strict=True)}
         simulation.engine.drive(simulation.forces.controls.driven(driven))
-        return np.array(simulation.engine.derivative(0.0, y))[functions._places]
+        return np.array(simulation.engine.derivative(0.0, y))[functions.state_indices]
 
     return derivative
 

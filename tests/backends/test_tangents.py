@@ -199,11 +199,11 @@ def test_whole_models(name):
     x[moving:] = np.where(x[moving:] == 0.0, 0.1, x[moving:]) * rng.uniform(0.95, 1.05, size - moving)
     rates, a, b = made.linear(0.3, x, u)
     y = np.zeros(size)
-    y[made._places] = x
+    y[made.state_indices] = x
     value, wanted, _ = carried(pack(made.mechanism, made.forces), 0.3, y.tolist(), u.tolist(), np.zeros(size))
-    places = np.ix_(made._places, made._places)
+    places = np.ix_(made.state_indices, made.state_indices)
     sizes = np.maximum(1.0, np.abs(a).max(axis=1, keepdims=True))
-    assert off(rates, value[made._places]) < 1e-12 and (np.abs(a - wanted[places]) / sizes).max() < 1e-12
+    assert off(rates, value[made.state_indices]) < 1e-12 and (np.abs(a - wanted[places]) / sizes).max() < 1e-12
     # Not all at once: whichever others are beside it, a direction has the same derivatives.
     along = rng.normal(size=(size + len(u), 1))
     _, change = made.along(0.3, x, u, along[:size], along[size:])

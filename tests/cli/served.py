@@ -22,7 +22,7 @@ def load() -> None:
     """Import the commands, and all that stands within their functions."""
     for name in osimlite.cli.COMMANDS:
         source = Path(osimlite.cli.__file__).with_name(f"{name.replace('-', '_')}.py").read_text(encoding="utf-8")
-        osimlite.cli._loaded(name)
+        osimlite.cli.load_command(name)
         for line in ast.walk(ast.parse(source)):
             # What is not installed is missed by the command that needs it.
             with suppress(ImportError):

@@ -51,7 +51,7 @@ def test_options_are_checked_before_the_walk(
     def walked(*_: object) -> None:
         raise AssertionError("it walked")
 
-    monkeypatch.setattr("osimlite.cli.gait._walk", walked)
+    monkeypatch.setattr("osimlite.cli.gait.simulate_walk", walked)
     assert run("dynamic-walker", *words) in (1, 2)
     error = capsys.readouterr().err
     assert said in error and error.count("\n") == 1

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from osimlite.cli.translate import _table
+from osimlite.cli.translate import tabulate
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.geometry import Mesh
 from osimlite.translate.fidelity import Fidelity
@@ -112,7 +112,7 @@ def test_paths_are_called_by_the_names_of_their_muscles() -> None:
     fidelity = Fidelity("arm", "mjcf")
     for name in ("BRA", "TRIlat"):
         fidelity.add("path", f"/forceset/{name}/path", "a path with a cylinder", "a tendon")
-    assert list(_table(fidelity, "MJCF").columns[2].cells) == ["BRA and TRIlat"]
+    assert list(tabulate(fidelity, "MJCF").columns[2].cells) == ["BRA and TRIlat"]
 
 
 @pytest.mark.parametrize(

@@ -166,6 +166,6 @@ def test_a_block_that_is_not_run_is_found() -> None:
 def test_the_reference_tells_of_all_that_the_package_exports() -> None:
     pytest.importorskip("numpy", reason="needs numpy (extra 'sim')")
     told = (ROOT / "docs" / "reference" / "library.md").read_text()
-    for exported in (getattr(osimlite, name) for name in osimlite._FUNCTIONS):
+    for exported in (getattr(osimlite, name) for name in osimlite.FUNCTIONS):
         name = f"{exported.__module__}.{exported.__name__}"
         assert f"::: {name}\n" in told or f"::: {exported.__module__}\n" in told, name

@@ -146,7 +146,7 @@ def test_a_text_that_is_neither(tmp_path: Path) -> None:
 
 def test_aliases_cannot_make_a_short_text_endless(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("yaml")
-    monkeypatch.setattr("osimlite.document.data._MOST_NUMBERS", 20_000)
+    monkeypatch.setattr("osimlite.document.data.MAX_NUMBERS", 20_000)
     levels = ["&a0 {class: ComponentSet}"]
     levels += [f"&a{i} {{class: ComponentSet, objects: [{', '.join([f'*a{i - 1}'] * 9)}]}}" for i in range(1, 9)]
     bomb = tmp_path / "bomb.yaml"

@@ -136,7 +136,7 @@ def test_numbers_of_elements_are_those_of_the_text() -> None:
     layout = document.model.layout
     assert layout is not None
     for body in (*bodies(document.model), layout.defaults[0]):
-        assert document.source.spans[body._index].tag == "Body"
+        assert document.source.spans[body.source_index].tag == "Body"
     wrong = read_document(Source(BODIES.replace("<mass>7<", "<mass>x<", 1).encode()))
     assert [(note.kind, wrong.source.spans[note.number].tag) for note in wrong.notes] == [("unreadable", "mass")]
 
@@ -162,7 +162,7 @@ def test_an_object_may_stand_in_a_file_of_its_own(folder: Path) -> None:
         ("include", "MarkerSet"),
         ("unknown-tag", "MarkerSet"),
     ]
-    assert document.source.spans[marker(document.model)._index].tag == "MarkerSet"
+    assert document.source.spans[marker(document.model).source_index].tag == "MarkerSet"
 
 
 def test_what_is_unchanged_stays_in_its_file(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:

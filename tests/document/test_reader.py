@@ -48,9 +48,9 @@ def test_every_element_keeps_its_number(fixtures: Path) -> None:
     source = Source.of_file(fixtures / "walker" / "DynamicWalkerModel.osim")
     model = read_document(source).model
     for component in model.walk():
-        assert source.spans[component._index].tag == component.tag if component._index is not None else True
+        assert source.spans[component.source_index].tag == component.tag if component.source_index is not None else True
     knee = model.find("/jointset/RightShankToThigh/RKnee_rz")
-    assert source.text[source.spans[knee._index].start :].startswith('<Coordinate name="RKnee_rz">')
+    assert source.text[source.spans[knee.source_index].start :].startswith('<Coordinate name="RKnee_rz">')
 
 
 def test_properties_in_any_order_and_only_what_is_there() -> None:

@@ -53,10 +53,16 @@ def cost_of(mechanism: Mechanism, markers: list[Marker], measured: Any, q: Any) 
 
 def derivatives(fit: PoseFit, frame: Any, q: Any) -> tuple[float, Any, Any]:
     """Cost, gradient and second derivative at a pose, in the order of the fit."""
-    system, shape = fit._system, fit._shape
+    system, shape = fit.system, fit.layout
     size = len(fit.order)
     m = pose_record.Fit(
-        system.program.ints, system.numbers, system._w, np.zeros(2 * size), shape.ints, shape.numbers, shape.work
+        system.program.ints,
+        system.numbers,
+        system.work_vector,
+        np.zeros(2 * size),
+        shape.ints,
+        shape.numbers,
+        shape.work,
     )
     m.v[m.p[pose_record.MEASURED] :][: fit.width] = frame
     assert weigh(m)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.lint.rules.structure import _homes
+from osimlite.lint.rules.structure import list_homes
 from osimlite.schema.base import Object
 from osimlite.schema.registry import class_for, tags
 from osimlite.schema.specs import field_specs
@@ -22,5 +22,5 @@ def test_every_property_is_found_in_the_classes_that_declare_it() -> None:
     assert len(owners) == 3 and len(properties) > 700
     for tag in sorted(properties):
         for package, owner in owners.items():
-            assert _homes(tag, owner) == find_homes(tag, package)
-    assert _homes("isDisabled", Object) == []
+            assert list_homes(tag, owner) == find_homes(tag, package)
+    assert list_homes("isDisabled", Object) == []

@@ -14,7 +14,7 @@ import pytest
 from osimlite.errors import MissingFileError
 from osimlite.lint import Config, validate
 from osimlite.lint import many as module
-from osimlite.lint.cache import _code
+from osimlite.lint.cache import digest_of_code
 from osimlite.lint.many import Texts, check_files, settings_of
 from osimlite.lint.ours import is_ours
 from osimlite.writing import user_cache_folder
@@ -36,7 +36,7 @@ MESH = """\
 @pytest.fixture
 def project(tmp_path):
     settings_of.__globals__["settings_for"].cache_clear()
-    module._resolved.cache_clear()
+    module.resolve_folder.cache_clear()
     (tmp_path / "osimlite.toml").write_text("")
     (tmp_path / "m.osim").write_text(MESH)
     yield tmp_path
@@ -251,11 +251,11 @@ def test_a_missing_file_is_named_also_by_another_process(project):
 
 def test_work_is_shared_only_if_there_is_enough(project, monkeypatch):
     jobs = [module.Job(str(project / "m.osim"), Config(), None)] * 3
-    assert module._processes(jobs) == 1
+    assert module.count_processes(jobs) == 1
     monkeypatch.setattr(module, "WORTH_SHARING", 10)
     monkeypatch.setattr("os.cpu_count", lambda: 4)
     monkeypatch.setattr("sys.platform", "win32")
-    assert module._processes(jobs) == 3
+    assert module.count_processes(jobs) == 3
 
 
 def test_the_text_of_a_file_that_has_gone_is_empty(project):
@@ -282,4 +282,4 @@ def test_xml_of_other_programs_is_known_by_its_root(text, ours):
 
 
 def test_every_part_that_checks_tells_which_code_this_is():
-    assert _code().endswith(f" {len([*Path(module.__file__).parents[1].rglob('*.py')])}")
+    assert digest_of_code().endswith(f" {len([*Path(module.__file__).parents[1].rglob('*.py')])}")

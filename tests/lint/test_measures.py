@@ -139,7 +139,7 @@ def test_without_machine_code_many_surfaces_are_not_measured(jumping, monkeypatc
     from osimlite.measuring import model
 
     monkeypatch.setattr(measures, "FEW", -1)
-    parts._memory.clear()
+    parts.remembered.clear()
     with monkeypatch.context() as without:
         without.setattr(model, "has_machine_code", lambda: False)
         (why,) = check_files([str(jumping)], Config()).unmeasured

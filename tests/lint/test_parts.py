@@ -38,7 +38,7 @@ def asked(monkeypatch):
         return result
 
     monkeypatch.setattr(osimlite.measuring, "measured", measured)
-    parts._memory.clear()
+    parts.remembered.clear()
     return results
 
 
@@ -52,7 +52,7 @@ def told(text):
 
 
 def fresh(text):
-    parts._memory.clear()
+    parts.remembered.clear()
     return told(text)
 
 
@@ -113,19 +113,19 @@ def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch, 
     (kept,) = findings_cache.glob("*/measured/*.json")
     subject = Subject(osimlite.document.survey.survey(Source(text.encode())))
     own = parts.parts_of(subject)
-    parts._memory.clear()
+    parts.remembered.clear()
     known = parts.recall(own, kept.parents[1])
     assert known.measures == measures_of(text)
     for wrong in ("{}", "[]", "x", json.dumps([{}, [1]]), kept.read_text().replace('"poses"', "5")[:-9]):
-        parts._memory.clear()
+        parts.remembered.clear()
         kept.write_text(wrong)
         assert parts.recall(own, kept.parents[1]) is None
-    parts._memory.clear()
+    parts.remembered.clear()
     assert check_files([str(path)], Config()).codes == result
 
 
 def measures_of(text):
-    parts._memory.clear()
+    parts.remembered.clear()
     subject = Subject(osimlite.document.survey.survey(Source(text.encode())))
     assert not subject.unmeasured()
     return measures.measures_of(subject)

@@ -130,13 +130,13 @@ def test_rows_of_vectors_are_taken_many_at_a_time(monkeypatch: pytest.MonkeyPatc
     lines = [f"{0.1 * k:.1f}\t1,-2e-3,{k}\t0.5,0.25,-1\n" for k in range(50)]
     lines[20] = "2.0\t1,2\t0.5,0.25,-1\n"
     odd: list[int] = []
-    one_by_one = Scan._odd
+    one_by_one = Scan.report_odd_line
 
     def noted(scan: Scan, text: bytes, line: int) -> None:
         odd.append(line)
         one_by_one(scan, text, line)
 
-    monkeypatch.setattr(Scan, "_odd", noted)
+    monkeypatch.setattr(Scan, "report_odd_line", noted)
     result = Scan(3, 3).run("".join(lines).encode(), 0, 7)
     assert odd == [27] and result.count == 50 and list(result.times[:2]) == [0.0, 0.1]
     assert [(fault.kind, fault.line) for fault in result.faults.values()] == [("cell", 27)]

@@ -32,7 +32,7 @@ def test_every_object_is_known_from_the_tags_before_it() -> None:
     """The classes that the schema gives to tags are those that the reader makes of them."""
     document = read_document(Source.of_characters(TEXT))
     for item in document.model.walk():
-        number = item._index
+        number = item.source_index
         if number is None:
             continue
         cursor = cursor_at(TEXT, document.source.spans[number].start + 1)

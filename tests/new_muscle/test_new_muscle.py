@@ -36,7 +36,7 @@ TEXT = """<?xml version="1.0" encoding="UTF-8"?>
 
 def forget_classes():
     kind_of_class.cache_clear()
-    for forget in registry._forget:
+    for forget in registry.callbacks_of_changes:
         forget()
 
 

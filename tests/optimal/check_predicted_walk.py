@@ -17,7 +17,7 @@ from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
 from osimlite.view.motion import contact_forces
 from osimlite.view.recording import read_recording
-from osimlite.view.report import _contacts, _controls, _trials
+from osimlite.view.report import collect_contacts, collect_controls, collect_trials
 
 WEIGHT = 75.0 * 9.80665
 
@@ -117,12 +117,12 @@ def test_a_report_shows_what_was_found(walk):
     ]
     (frame,) = re.findall('srcdoc="(.+?)"', page, re.S)
     assert "foot_r_heel_r" in frame and "soleus_r" in frame
-    (trial,) = _trials({file: outcome})
-    up = {line.side: line.column for line in _contacts([trial])["along y (N)"]}
+    (trial,) = collect_trials({file: outcome})
+    up = {line.side: line.column for line in collect_contacts([trial])["along y (N)"]}
     assert {*up} == {"r", "l"}
     stride = found.stride.times
     assert np.trapezoid(up["r"] + up["l"], stride) / stride[-1] == pytest.approx(WEIGHT, rel=0.03)
-    assert {*_controls([trial])} == {name.rpartition("/")[2][:-2] for name in found.controls.columns}
+    assert {*collect_controls([trial])} == {name.rpartition("/")[2][:-2] for name in found.controls.columns}
 
 
 @pytest.mark.parametrize(

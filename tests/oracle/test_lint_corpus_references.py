@@ -82,7 +82,7 @@ def places_of(source: Source) -> Iterator[Place]:
     for use in subject.uses:
         if use.reference.rule in ("file", "column", "positional", "point-index", "input"):
             continue
-        number = use.holder._index
+        number = use.holder.source_index
         if number is None or not isinstance(use.value, str):
             continue
         if use.spec.name == "name":
@@ -106,11 +106,11 @@ def targets_of(source: Source) -> Iterator[Target]:
     seen = set()
     for use in subject.uses:
         target = subject.resolution(use).target
-        if target is None or target._index is None or target is use.owner or target._index in seen:
+        if target is None or target.source_index is None or target is use.owner or target.source_index in seen:
             continue
-        seen.add(target._index)
-        span = source.spans[target._index]
-        line, column, _ = source.of_attribute(target._index, "name")
+        seen.add(target.source_index)
+        span = source.spans[target.source_index]
+        line, column, _ = source.of_attribute(target.source_index, "name")
         start = source.line_start(line) + column - 1
         if target.name and source.text.startswith(f'"{target.name}"', start - 1):
             yield Target(type(target).__name__, target.name, span.start, span.end, start)

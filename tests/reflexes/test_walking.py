@@ -224,7 +224,7 @@ def test_the_scenario_says_how_to_search_and_step(arm) -> None:
     scenario = Scenario(arm)
     assert (scenario.population, scenario.seed) == (6, 3)
     scenario.walk({}, duration=0.005)
-    (counts,) = scenario.walkers(1).copies._batch.counts[:, :1]
+    (counts,) = scenario.walkers(1).copies.batch.counts[:, :1]
     assert counts[0] == 50
 
 
@@ -236,7 +236,7 @@ def test_implicit_steps_do_not_shrink_where_feet_touch(ours) -> None:
     steps = []
     for scenario in (walked, wanted):
         result = scenario.walk(scenario.best(), duration=0.5)
-        steps.append(scenario.walkers(1).copies._batch.counts[0, 0])
+        steps.append(scenario.walkers(1).copies.batch.counts[0, 0])
         assert result.times[0] == pytest.approx(0.5)
     assert 0 < steps[0] < 4 <= steps[1]
 

@@ -199,5 +199,5 @@ def test_every_object_of_the_file_is_found_by_its_class(walker: Model) -> None:
     result = [id(item) for items in by_class.values() for item in items]
     assert len(result) == len(set(result))
     assert all(type(item) is cls for cls, items in by_class.items() for item in items)
-    assert {id(item) for item in walker.walk() if item._index is not None} <= set(result)
+    assert {id(item) for item in walker.walk() if item.source_index is not None} <= set(result)
     assert [id(item) for item in walker.components(Body)] == [id(item) for item in by_class[Body]]

@@ -75,7 +75,7 @@ def test_walker_mass_matrix(fixtures, cases):
     for case in cases["cases"]:
         _, mechanism = walker_at(fixtures, case["q"][0], locked=False)
         with BulletEngine(mechanism, Forces(())) as engine:
-            places, robot = engine.coordinates, engine._body
+            places, robot = engine.coordinates, engine.world
             body = bullet_world.bullet.calculateMassMatrix(
                 robot.id, [case["q"][place] for place in places], 0, robot.client
             )

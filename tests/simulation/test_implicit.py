@@ -99,7 +99,7 @@ def assert_condensed(model, y, rel=1e-4):
     room, f = np.zeros(condensation_room(size, int(s[MODEL.RESPONSES]))), np.zeros(len(y))
     rates = partial(rates_at, system)
     jacobian = np.column_stack([(rates(y + h) - rates(y - h)) / 2e-6 for h in 1e-6 * np.eye(len(y))])
-    assert linearise(system.program.ints, system.numbers, system._w, y, f, room, 0.0) == OUTCOME.OK
+    assert linearise(system.program.ints, system.numbers, system.work_vector, y, f, room, 0.0) == OUTCOME.OK
     assert condense(system.program.ints, c, room)
     right = np.random.default_rng(1).uniform(-1.0, 1.0, len(y))
     result = right.copy()

@@ -22,7 +22,7 @@ def fixed_steps(f, y, until, n):
     """The state after n steps of equal length, which nothing but their ends decides."""
     integrator = runge_kutta_merson(f, 0.0, y, len(y) // 2, accuracy=0.9)
     for i in range(n):
-        integrator._next_step = until / n
+        integrator.next_step = until / n
         integrator.step(until * (i + 1) / n)
     assert integrator.attempted == n
     return integrator.state
@@ -48,7 +48,7 @@ def test_exact_for_cubic_derivatives(coefficients, h, t0):
         return [a + t * (b + t * (c + t * d))]
 
     integrator = runge_kutta_merson(f, t0, [0.0], 0, accuracy=0.9)
-    integrator._next_step = h
+    integrator.next_step = h
     integrator.step()
     wanted = antiderivative(integrator.time) - antiderivative(t0)
     assert integrator.state[0] == pytest.approx(wanted, abs=1e-12 * (1 + h) ** 4 * 20)

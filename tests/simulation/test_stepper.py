@@ -76,7 +76,7 @@ def test_interpolation_is_exact_for_cubic_motion(coefficients, fraction):
     a, b, c, d = coefficients
     integrator = runge_kutta_merson(lambda t, y: [b + t * (2 * c + t * 3 * d)], 0.0, [a], 0)
     list(integrator.steps(0.5))
-    start = integrator._previous[0]
+    start = integrator.previous[0]
     t = start + fraction * (0.5 - start)
     assert integrator.at(t)[0] == pytest.approx(a + t * (b + t * (c + t * d)), abs=1e-9)
 

@@ -186,8 +186,8 @@ def _ends(content: bytes) -> list[int]:
     """Where the records of a partial file end."""
     ends = [0]
     while ends[-1] < len(content):
-        head = results._HEAD.unpack_from(content, ends[-1])
-        ends.append(ends[-1] + results._HEAD.size + head[1])
+        head = results.HEAD.unpack_from(content, ends[-1])
+        ends.append(ends[-1] + results.HEAD.size + head[1])
     return ends
 
 
@@ -334,8 +334,8 @@ def test_one_program_at_a_time_writes(made, tmp_path):
 def test_a_full_disk_is_told(tmp_path):
     partial = Partial(tmp_path / "r", schema({"run": "int64"}, {}))
     partial.add([[0, 1]])
-    partial._stream.close()
-    partial._stream = open("/dev/full", "ab", buffering=0)  # noqa: SIM115
+    partial.stream.close()
+    partial.stream = open("/dev/full", "ab", buffering=0)  # noqa: SIM115
     with pytest.raises(OsimliteError, match="No space left on device; make room, then go on with --resume"):
         partial.add([[2, 3]])
     partial.close()

@@ -12,7 +12,7 @@ from osimlite.multibody import build_mechanism
 from osimlite.schema.geometry import Mesh
 from osimlite.schema.model import Model
 from osimlite.view import animate
-from osimlite.view.animation import _Film, _hex, _round_down
+from osimlite.view.animation import Film, round_down, to_hex
 from osimlite.view.collect import build_scene
 from osimlite.view.picture import FORCE
 from tests.view.motions import Recorded, stroll
@@ -61,9 +61,9 @@ def test_the_film_runs_at_the_speed_of_the_motion(film):
 def test_forces_are_drawn_while_they_act(film):
     pictures = [picture for picture, _ in film[0]]
     # Loaded from 0.1 to 0.3 s; the scale of the forces has the same colour all the time.
-    scale = has(pictures[0], _hex(FORCE))
+    scale = has(pictures[0], to_hex(FORCE))
     assert scale > 0
-    assert has(pictures[5], _hex(FORCE)) > scale + 50
+    assert has(pictures[5], to_hex(FORCE)) > scale + 50
 
 
 def test_slow_motion_has_more_frames(tmp_path):
@@ -74,7 +74,7 @@ def test_slow_motion_has_more_frames(tmp_path):
 
 def test_the_camera_follows_the_mass_centre_of_what_moves():
     mechanism = build_mechanism(dynamic_walker())
-    film = _Film(scene_of(dynamic_walker()), stroll(), 25, 1.0, "xy")
+    film = Film(scene_of(dynamic_walker()), stroll(), 25, 1.0, "xy")
     names = [body.name for body in mechanism.bodies]
     assert [name for name, moves in zip(names, film.moving, strict=False) if not moves] == ["Platform"]
     for number in (0, 7):
@@ -84,7 +84,7 @@ def test_the_camera_follows_the_mass_centre_of_what_moves():
 
 
 def test_all_that_moves_is_in_the_picture():
-    film = _Film(scene_of(dynamic_walker()), stroll(), 25, 1.0, "xy")
+    film = Film(scene_of(dynamic_walker()), stroll(), 25, 1.0, "xy")
     seen = 0
     for pose, focus in zip(film.poses, film.flat(film.focus), strict=True):
         for item in film.scene.drawn():
@@ -103,7 +103,7 @@ def test_what_stands_still_is_shown_if_it_is_not_too_large():
     model = dynamic_walker()
     del model.body_set.objects[0].attached_geometry[:]
     motion = dataclasses.replace(motion, values=motion.values[0] + 0.5 * np.outer(motion.times, knee))
-    film = _Film(scene_of(model), motion, 25, 1.0, "xy")
+    film = Film(scene_of(model), motion, 25, 1.0, "xy")
     names = [body.name for body in film.mechanism.bodies]
     assert [name for name, moves in zip(names, film.moving, strict=False) if moves] == ["RightShank"]
     pelvis = film.flat(film.poses[0].origins[[names.index("Pelvis")]])[0]
@@ -116,7 +116,7 @@ def test_ground_stays_in_the_picture_of_a_jump():
     level = motion.values[0] * (np.array(motion.coordinates) != "platform_rz")
     up = np.outer(motion.times, np.array(motion.coordinates) == "Pelvis_ty")
     jump, drop = (
-        _Film(scene_of(dynamic_walker()), dataclasses.replace(motion, values=level + speed * up), 25, 1.0, "xy")
+        Film(scene_of(dynamic_walker()), dataclasses.replace(motion, values=level + speed * up), 25, 1.0, "xy")
         for speed in (1.0, 40.0)
     )
     highest = jump.flat(jump.focus)[-1, 1]
@@ -190,4 +190,4 @@ def test_nothing_is_left_behind_by_a_failure(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("value", "round_"), [(0.37, 0.2), (5.0, 5.0), (999.0, 500.0), (1.0, 1.0)])
 def test_scales_are_round(value, round_):
-    assert _round_down(value) == pytest.approx(round_)
+    assert round_down(value) == pytest.approx(round_)

@@ -11,7 +11,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.multibody import build_mechanism
 from osimlite.simulation import simulate
 from osimlite.view import plot_simulation
-from osimlite.view.plots import STORED, _figures, energies, figure_of, lines_in
+from osimlite.view.plots import STORED, draw_figures, energies, figure_of, lines_in
 from tests.view.motions import Recorded, stroll
 
 pytest.importorskip("matplotlib")
@@ -23,7 +23,7 @@ def walker():
 
 def drawn(name, motion=None, mechanism="walker"):
     """The figure of a name, laid out as it will be saved."""
-    figures = dict(_figures(motion or stroll(), walker() if mechanism == "walker" else mechanism))
+    figures = dict(draw_figures(motion or stroll(), walker() if mechanism == "walker" else mechanism))
     return laid_out(figures[name])
 
 
@@ -74,7 +74,7 @@ def test_many_coordinates_are_shared_out_to_panels():
     motion = Recorded(times, names, np.ones((5, 16)), np.zeros((5, 16)))
     figure = drawn("coordinates.png", motion, None)
     assert [len(panel.get_lines()) for panel in figure.axes] == [6, 6, 4]
-    assert "energy.png" not in dict(_figures(motion, None))
+    assert "energy.png" not in dict(draw_figures(motion, None))
 
 
 def test_a_line_that_lies_on_another_lets_it_through():
@@ -86,7 +86,7 @@ def test_a_line_that_lies_on_another_lets_it_through():
 
 def test_no_legend_covers_data_and_all_is_on_the_sheet():
     motion, legends = stroll(), 0
-    for _, figure in _figures(motion, walker()):
+    for _, figure in draw_figures(motion, walker()):
         sheet = laid_out(figure).bbox
         for panel in figure.axes:
             legend = panel.get_legend()
@@ -161,7 +161,7 @@ def test_energy_is_that_of_the_mechanism():
 
 def test_energy_of_a_simulation_has_what_contacts_store():
     trajectory = simulate(dynamic_walker(), 0.1)
-    (panel,) = dict(_figures(trajectory, trajectory.mechanism))["energy.png"].axes
+    (panel,) = dict(draw_figures(trajectory, trajectory.mechanism))["energy.png"].axes
     result = lines(panel)
     assert set(result) == {"kinetic", "potential of gravity", STORED, "sum"}
     stored, total = (trajectory.energy[part] for part in ("stored", "total"))

@@ -19,7 +19,7 @@ from osimlite.multibody import build_mechanism
 from osimlite.simulation.files.storage import write_sto
 from osimlite.tools.evidence import root_of, side_of, steps_of
 from osimlite.tools.outcome import Outcome
-from osimlite.view.report import Trial, _angles, _moments, report
+from osimlite.view.report import Trial, collect_angles, collect_moments, report
 from tests.cli.command import run
 from tests.fitting.test_inverse_kinematics import free_body
 from tests.tools.test_many import make_trial
@@ -138,12 +138,12 @@ def test_what_is_drawn_are_the_tables(trials: Path, loads: Path) -> None:
     folder = trials / "trial0"
     outcomes: list[Outcome] = [osimlite.run(folder / "z_ik.xml"), osimlite.run(folder / "id.xml")]
     trial = Trial("trial0", outcomes)
-    panels = _angles([trial])
+    panels = collect_angles([trial])
     table = outcomes[0].tables["ik.mot"]
     drawn = {label.removesuffix(" (deg)"): lines[0].column for label, lines in panels.items()}
     assert drawn and all(np.allclose(column, table[name], atol=1e-9) for name, column in drawn.items())
     # The only joint is that to ground, whose forces are residuals.
-    assert _moments([trial]) == {} and trial.evidence is outcomes[0].evidence
+    assert collect_moments([trial]) == {} and trial.evidence is outcomes[0].evidence
     assert outcomes[1].evidence is not None and outcomes[1].evidence.loads is None
 
 

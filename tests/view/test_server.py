@@ -48,7 +48,7 @@ def server(running, capfd, caplog):
 
 def said(server: PageServer, question: bytes) -> tuple[int, bytes]:
     """Status and body of what the server answers until it hangs up; 0 without a head, as in the first HTTP."""
-    with socket.create_connection((HOST, server._server.server_address[1]), timeout=20) as line:
+    with socket.create_connection((HOST, server.server.server_address[1]), timeout=20) as line:
         line.sendall(question)
         parts = []
         while part := line.recv(65536):
@@ -111,7 +111,7 @@ def test_half_a_question_is_given_up(server, part):
 
 def test_one_who_hangs_up_does_no_harm(server):
     for part in (b"", b"GET / HTTP/1.1\r\n", HEAD.encode() + b"Content-Length: 10\r\n\r\n{"):
-        with socket.create_connection((HOST, server._server.server_address[1])) as line:
+        with socket.create_connection((HOST, server.server.server_address[1])) as line:
             line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
             line.sendall(part)
 

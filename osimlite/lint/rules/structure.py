@@ -102,7 +102,7 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _Unknown:
         home = set_for(note.value)
         message += f"; it belongs in the {home}" if home and isinstance(owner, Model) else ""
     else:
-        homes = _homes(note.word, type(owner))
+        homes = list_homes(note.word, type(owner))
         message += f": it is a property of {listed(homes, most=3)}" if homes else ""
     same = suggestion is not None and suggestion.lower() == note.word.lower()
     free = suggestion is not None and suggestion not in _present(owner)
@@ -335,7 +335,7 @@ def _default_of(spec: FieldSpec) -> str:
     return f" ({shown(spec.default)})"
 
 
-def _homes(tag: str, owner: type[Object]) -> list[str]:
+def list_homes(tag: str, owner: type[Object]) -> list[str]:
     """Classes that have a property `tag`; a class is left out where one it derives from has it.
 
     In a model those of tools are left out, and the other way round.

@@ -103,7 +103,8 @@ class KernelText:
         of the last evaluation, whose record tells what that has found.
         """
         kind, force = self.kind, self.kind.geometry.along[0]
-        rows, changed, arguments = (force, *(state.rate for state in kind.states)), self._changed, self._arguments
+        rows, changed = (force, *(state.rate for state in kind.states)), self.changed_outputs
+        arguments = self._arguments
         directions = {column: direction for direction, column in enumerate(changed)}
         law, count = kind.again or kind.law, len(changed)
         for column, place in changed.items():
@@ -139,7 +140,7 @@ class KernelText:
         # Up to the end the record has what is known.
         own = (f"found[{place}]" for name, place in recorded.items() if name not in inputs)
         known = dict(zip(made.known._fields, own, strict=False))
-        of_moment = len(self._inputs) + 1 + sum(state.given for state in kind.states)
+        of_moment = len(self.input_names) + 1 + sum(state.given for state in kind.states)
         told = f"known({', '.join(known.values())}), {arguments[of_moment]}"
         begin = f"{', '.join(known.values())} = {self._call(arguments[: of_moment + 1], 'begin')}"
         first, second = made.asked, made.sought
@@ -201,10 +202,10 @@ class KernelText:
         ]
 
     @property
-    def _changed(self) -> dict[int, int]:
+    def changed_outputs(self) -> dict[int, int]:
         """By column of the derivatives the place of the argument that is changed."""
         kind = self.kind
-        inputs = list(self._inputs)
+        inputs = list(self.input_names)
         result = {column: inputs.index(name) for column, name in enumerate(kind.geometry.inputs) if name in inputs}
         given = [column for column, state in enumerate(kind.states) if state.given]
         first = len(inputs) + kind.controlled
@@ -214,7 +215,7 @@ class KernelText:
     def responds(self) -> bool:
         """Whether its forces have derivatives along one displacement."""
         kind = self.kind
-        return kind.law is not None and kind.geometry.along[0] in kind.outputs and bool(self._changed)
+        return kind.law is not None and kind.geometry.along[0] in kind.outputs and bool(self.changed_outputs)
 
     def _function(self, form: str, law: Callable[..., Any] | None, lines: Sequence[str]) -> Callable[..., int]:
         return self._written(form, "item", [*self._places_of_item, *self.kind.geometry.before, *lines], law=law)
@@ -278,10 +279,11 @@ class KernelText:
         given = [place for place, state in self._places.items() if state.given]
         states = [f"(y[i[{place}]] if i[{place}] >= 0 else 0.0)" for place in given]
         count = 1 if kind.controlled else 0
-        return [*self._inputs, *terms[:count], *states, *terms[count:]]
+        return [*self.input_names, *terms[:count], *states, *terms[count:]]
 
     @property
-    def _inputs(self) -> tuple[str, ...]:
+    def input_names(self) -> tuple[str, ...]:
+        """Names of what the law gets from the geometry."""
         return self.kind.geometry.inputs if self.kind.inputs is None else self.kind.inputs
 
     def _call(self, arguments: Sequence[str], law: str = "law") -> str:
@@ -289,7 +291,7 @@ class KernelText:
         made = self.kind.together
         if made is None:
             return f"{law}({', '.join(arguments)})"
-        names = *self._inputs, "excitation", *(state.name for state in self.kind.states if state.given)
+        names = *self.input_names, "excitation", *(state.name for state in self.kind.states if state.given)
         given = dict(zip(names, arguments, strict=False))
         first = f"{made.__name__}({', '.join(given.get(name, '0.0') for name in made._fields)})"
         return f"{law}({', '.join((first, *arguments[len(names) :]))})"

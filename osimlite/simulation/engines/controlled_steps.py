@@ -85,7 +85,7 @@ class ControlledSteps(Stepper):
         super().__init__(engine.derivative, t, y, observe, engine.state.names)
         self._engine, self._accuracy, self._integrator, self._step_bounds = engine, accuracy, integrator, step_bounds
         self._held = held
-        self._next_step = min(max(INITIAL_STEP, step_bounds[0]), step_bounds[1]) if held is None else held.next_step
+        self.next_step = min(max(INITIAL_STEP, step_bounds[0]), step_bounds[1]) if held is None else held.next_step
         self._room: Floats | None = None
         self._put_off: list[tuple[Floats, Floats]] = []
         self._seen: tuple[float, list[float], Sequence[float]] = (self.time, self.state, self.derivative)
@@ -103,7 +103,7 @@ class ControlledSteps(Stepper):
 
     def interpolant(self) -> Callable[[float], list[float]]:
         """The cubic Hermite polynomial through the ends of the last step, to where the constraints hold."""
-        ends, size = (*self._previous, self.time, self.state, self.derivative), len(self.state)
+        ends, size = (*self.previous, self.time, self.state, self.derivative), len(self.state)
         engine, tolerance = self._engine, self._accuracy / 10.0
 
         def held(t: float) -> list[float]:
@@ -134,7 +134,7 @@ class ControlledSteps(Stepper):
         for log, forces in waiting:
             for row, pushes in zip(log.tolist(), forces, strict=True):
                 t, y, f = row[0], row[1 : 1 + size], row[1 + size :]
-                self._previous = self._seen
+                self.previous = self._seen
                 self.time, self.state, self.derivative = self._seen = t, y, f
                 self._engine.note_loads(pushes)
                 if self._observe is not None:
@@ -157,7 +157,7 @@ class ControlledSteps(Stepper):
                 step_bounds=self._step_bounds,
             ),
             start=self.time,
-            next_step=self._next_step,
+            next_step=self.next_step,
             most_logged=LOGGED_STEPS,
             start_holds=True,
             held=self._held,
@@ -190,7 +190,7 @@ class ControlledSteps(Stepper):
         clock, state, counts = batch.clocks[0].tolist(), batch.states[0].tolist(), count[: record.REPORTED].tolist()
         # Ctrl-C comes between calls of functions: with none here, all of these are set or none is.
         self._put_off += (log,)
-        (self.time, self._next_step), self.state = clock, state
+        (self.time, self.next_step), self.state = clock, state
         self.taken, self.attempted, self.evaluations = counts
         if ending == record.FAILED:
             self._explain(batch.errors.tolist())

@@ -278,7 +278,7 @@ class Program:
         # Searches side by side know nothing of derivatives.
         runs = {} if isinstance(code, Tangents) else packed.runs
         functions = tuple(dict.fromkeys((*entries, *packed.laws, *kernels, *runs.values())))
-        self._equilibria, self._responses = packed.equilibria, packed.responses
+        self._equilibria, self.responses = packed.equilibria, packed.responses
         later = *packed.equilibria.values(), *packed.responses.values()
         self.code = code = code.chosen_for(functions, () if isinstance(code, Tangents) else later)
         runs = runs if code is COMPILED else {}
@@ -311,8 +311,8 @@ class Program:
 
     def link_responses(self, method: str) -> None:
         """Make ready an implicit method and the derivatives that it needs, which not everybody asks for."""
-        self.code.make_ready((method, *dict.fromkeys(self._responses.values())))
-        for place, kernel in self._responses.items():
+        self.code.make_ready((method, *dict.fromkeys(self.responses.values())))
+        for place, kernel in self.responses.items():
             if not self.ints[place]:
                 self._link(place, kernel)
 

@@ -41,14 +41,14 @@ def composition(functions: Sequence[Function], span: tuple[float, float]) -> tup
     values = np.stack([sampled(item, at) for item in functions], axis=1)
     # The two sides of a body have the same functions, or their negatives.
     signs = np.where(values[0] < 0.0, -1.0, 1.0)
-    bent, rows = _nearest((values * signs).tobytes())
+    bent, rows = find_nearest((values * signs).tobytes())
     normal = Polynomial((-(low + high) / (high - low), 2.0 / (high - low)))
     slides = np.array([_padded(Chebyshev(row).convert(kind=Polynomial)) for row in (rows * signs).T])
     return REACH * _padded(Polynomial(bent)(normal)), slides / REACH ** np.arange(DEGREE + 1)
 
 
 @cache
-def _nearest(data: bytes) -> tuple[Array, Array]:
+def find_nearest(data: bytes) -> tuple[Array, Array]:
     """The quartic (5,), and by Chebyshev polynomials the quartics (5, k) of it, nearest to values (SAMPLES, k)."""
     values = np.frombuffer(data).reshape(SAMPLES, -1)
     powers = np.vander(UNIT, DEGREE + 1, increasing=True)

@@ -198,18 +198,18 @@ def test_positions_are_those_of_the_old_text(fixtures: Path) -> None:
     source, model = old.source, old.model
 
     def line_of(path: str, tag: str) -> str:
-        number = source.child(model[path]._index, tag)
+        number = source.child(model[path].source_index, tag)
         assert number is not None
         return source.lines[source.of_tag(number).line - 1].strip()
 
     hip = model["/jointset/hip"]
-    assert source.lines[source.of_tag(hip._index).line - 1].strip() == '<PinJoint name="hip">'
+    assert source.lines[source.of_tag(hip.source_index).line - 1].strip() == '<PinJoint name="hip">'
     assert line_of("/jointset/hip", "socket_parent_frame") == "<parent_body>ground</parent_body>"
     assert line_of("/jointset/hip/ground_offset", "translation") == (
         "<location_in_parent>0.1234567891 0 0</location_in_parent>"
     )
     assert line_of("/bodyset/thigh", "inertia").startswith("<inertia_xx>")
-    assert all(source.spans[item._index].tag for item in model.walk() if item._index is not None)
+    assert all(source.spans[item.source_index].tag for item in model.walk() if item.source_index is not None)
 
 
 def test_notes_stand_where_they_stood_in_the_old_text() -> None:
@@ -233,7 +233,7 @@ def test_a_model_without_a_document_around_it() -> None:
     old = read_document(Source(f'<?xml version="1.0"?>\n<!--from 2005-->\n<Model name="old">{BODIES}</Model>'.encode()))
     assert old.version == 10500
     assert old.model["/jointset/hip/flexion"].name == "flexion"
-    assert old.source.spans[old.model._index].tag == "Model"
+    assert old.source.spans[old.model.source_index].tag == "Model"
 
 
 @pytest.mark.parametrize(

@@ -28,8 +28,8 @@ STATES = 2
 
 def jets_of(kind: Any, given: tuple[Any, ...]) -> tuple[list[Any], list[int]]:
     """What a law was given, with jets for what its response is by, and the columns of these."""
-    changed, count = kind.text._changed, len(kind.text._changed)
-    names = [*kind.text._inputs, "excitation", *(state.name for state in kind.states if state.given)]
+    changed, count = kind.text.changed_outputs, len(kind.text.changed_outputs)
+    names = [*kind.text.input_names, "excitation", *(state.name for state in kind.states if state.given)]
     flat = [getattr(given[0], name) for name in names] if kind.together else [*given]
     none = np.zeros(count)
     for direction, place in enumerate(changed.values()):
@@ -97,10 +97,10 @@ def _noted(given: dict[str, Any], kind: Any, *own: Any) -> Any:
 def responses(system: System, y: np.ndarray) -> dict[str, np.ndarray]:
     """The derivatives of each force, by the name of what finds them."""
     s, result = system.program.ints, {}
-    for place, name in system.program._responses.items():
-        kernel = system.program.code.bound(name, s, system.numbers, system._w, y, np.zeros(len(y)))
+    for place, name in system.program.responses.items():
+        kernel = system.program.code.bound(name, s, system.numbers, system.work_vector, y, np.zeros(len(y)))
         if isinstance(system.program.code, Checked):
-            kernel = partial(pointers.call, int(s[place]), s, system.numbers, system._w, y, np.zeros(len(y)))
+            kernel = partial(pointers.call, int(s[place]), s, system.numbers, system.work_vector, y, np.zeros(len(y)))
         assert kernel(int(s[place + layout.RESPONSE.ITEM])) == OUTCOME.OK
-        result[name] = np.array(system._w[WORK.SCRATCH : WORK.SCRATCH + INVERSE])
+        result[name] = np.array(system.work_vector[WORK.SCRATCH : WORK.SCRATCH + INVERSE])
     return result

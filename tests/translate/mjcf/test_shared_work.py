@@ -17,9 +17,9 @@ from osimlite.translate.mjcf.poses import random_poses
 def test_the_other_side_of_a_body_takes_no_second_fit() -> None:
     right = SimmSpline((0.0, 0.4, 0.9, 1.3, 2.0), (0.1, 0.3, -0.2, 0.25, 0.2))
     first, slides = moving.composition((right, right), (0.0, 2.0))
-    fits = moving._nearest.cache_info().misses
+    fits = moving.find_nearest.cache_info().misses
     other, mirrored = moving.composition((right, Scaled(-1.0, right)), (0.0, 2.0))
-    assert moving._nearest.cache_info().misses == fits
+    assert moving.find_nearest.cache_info().misses == fits
     assert np.array_equal(first, other)
     assert np.array_equal(mirrored, slides * [[1.0], [-1.0]])
 

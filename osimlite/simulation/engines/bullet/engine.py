@@ -94,13 +94,13 @@ class BulletEngine(KernelEngine):
                 f"take {MASS_MATRIX} for '{mechanism.name}'"
             )
         files = {} if visuals is None else visuals.files
-        self._window: Window | None = None
+        self.window: Window | None = None
         if show:
             from osimlite.simulation.engines.bullet.window import Window
 
-            self._window = Window(robot, mechanism.gravity.tolist(), files, self._joint_values)
+            self.window = Window(robot, mechanism.gravity.tolist(), files, self._joint_values)
         is_exact = self.route == ARTICULATED_BODY
-        self._body = body = World(robot, mechanism.gravity.tolist(), files=files, exact=is_exact)
+        self.world = body = World(robot, mechanism.gravity.tolist(), files=files, exact=is_exact)
         try:
             indices = {item.path: index for index, item in enumerate(mechanism.bodies)}
             added = [
@@ -123,7 +123,7 @@ class BulletEngine(KernelEngine):
     # ---------------------------------------------------------------------------------------- accelerations
     def _supply_matrix(self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int) -> None:
         """Mass matrix and bias; see :class:`osimlite.simulation.pack_chain.Chain`."""
-        robot, client, first = self._body.id, self._body.client, self._forces
+        robot, client, first = self.world.id, self.world.client, self._forces
         values, rates, accelerations = data[self._moves : first].reshape(3, -1).tolist()
         try:
             forces = bullet.calculateInverseDynamics(robot, values, rates, accelerations, 0, client)
@@ -143,7 +143,7 @@ class BulletEngine(KernelEngine):
         values, rates, biases = data[self._moves : first].reshape(3, -1)
         count, applied = len(values), f[size : 2 * size]
         forces = self.joint_forces(y.tolist(), applied)
-        result = self._body.accelerations_by_step(values.tolist(), rates.tolist(), forces)
+        result = self.world.accelerations_by_step(values.tolist(), rates.tolist(), forces)
         applied[:] = 0.0
         data[first : first + count] = biases - result
         data[first + count : first + count + count * count] = np.eye(count).ravel()
@@ -157,7 +157,7 @@ class BulletEngine(KernelEngine):
     # ---------------------------------------------------------------------------------------------- motion
     def stepper(self, t: float, y: Sequence[float], settings: Settings, observe: Observer) -> Stepper:
         """What integrates from a state on: Runge-Kutta-Merson, or fixed steps, which Bullet takes if it can."""
-        window = self._window
+        window = self.window
         if window is not None:
             tell = observe
 
@@ -171,18 +171,18 @@ class BulletEngine(KernelEngine):
 
     def _joint_values(self, y: Sequence[float]) -> list[float]:
         q = np.array(self.state.values(y))
-        return [joint.value(q) for joint in self._body.joints]
+        return [joint.value(q) for joint in self.world.joints]
 
     def close(self) -> None:
         """Leave Bullet; any number of times."""
-        self._body.close()
-        if self._window is not None:
-            self._window.close()
+        self.world.close()
+        if self.window is not None:
+            self.window.close()
 
     def hold(self) -> None:
         """Keep the window, if there is one, until somebody closes it."""
-        if self._window is not None:
-            self._window.hold()
+        if self.window is not None:
+            self.window.hold()
 
 
 def _is_plain(mechanism: Mechanism, robot: Robot) -> bool:

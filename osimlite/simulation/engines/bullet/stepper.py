@@ -30,20 +30,20 @@ class BulletStepper(SemiImplicitEuler):
 
     def __init__(self, engine: BulletEngine, t: float, y: Sequence[float], h: float, observe: Observer) -> None:
         super().__init__(engine.applied, t, y, len(engine.order), h, observe=observe, names=engine.state.names)
-        self._engine, self._body, self._places = engine, engine._body, engine.coordinates
+        self._engine, self.world, self._places = engine, engine.world, engine.coordinates
         q, u = engine.state.values(y), engine.state.speeds(y)
         rates = engine.mechanism.coordinate_rates(q, u)[self._places]
-        self._body.set_state([q[place] for place in self._places], rates.tolist())
+        self.world.set_state([q[place] for place in self._places], rates.tolist())
 
     def _moved(self, h: float) -> list[float]:
         layout, mechanism, count = self._engine.state, self._engine.mechanism, self._nq
         forces = np.array(self.derivative[count : 2 * count])
-        self._body.step(h, self._engine.joint_forces(self.state, forces))
+        self.world.step(h, self._engine.joint_forces(self.state, forces))
         q, rates = np.array(layout.values(self.state)), np.zeros(len(mechanism.coordinates))
-        q[self._places], rates[self._places] = self._body.get_state()
+        q[self._places], rates[self._places] = self.world.get_state()
         z = [x + h * rate for x, rate in zip(self.state[2 * count :], self.derivative[2 * count :], strict=True)]
         y = layout.pack(q.tolist(), mechanism.speeds_from_rates(q, rates).tolist(), z)
         # Bullet clips what would be faster, so that a motion that has burst may look finite.
-        if not max(map(abs, y[: 2 * count]), default=0.0) < 0.5 * self._body.FASTEST:
+        if not max(map(abs, y[: 2 * count]), default=0.0) < 0.5 * self.world.FASTEST:
             raise burst(self.time, self._h)
         return y

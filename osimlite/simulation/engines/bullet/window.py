@@ -53,8 +53,8 @@ class Window:
                 "and take --animate for a film"
             )
         with muted(1):
-            self._client = int(bullet.connect(bullet.GUI))
-        if self._client < 0:
+            self.client = int(bullet.connect(bullet.GUI))
+        if self.client < 0:
             raise SimulationError("Bullet opens no window here; leave out --gui, and take --animate for a film")
         # Models without gravity have OpenSim's Y up too.
         y_is_up = abs(gravity[2]) <= max(abs(gravity[0]), abs(gravity[1]))
@@ -64,11 +64,11 @@ class Window:
             bullet.COV_ENABLE_KEYBOARD_SHORTCUTS: False,
         }
         for switch, state in switches.items():
-            bullet.configureDebugVisualizer(switch, int(state), physicsClientId=self._client)
+            bullet.configureDebugVisualizer(switch, int(state), physicsClientId=self.client)
         with temporary_file(robot_text(robot), files) as path:
-            self._robot = bullet.loadURDF(path, useFixedBase=1, physicsClientId=self._client)
-        count = bullet.getNumJoints(self._robot, self._client)
-        infos = [bullet.getJointInfo(self._robot, index, self._client) for index in range(count)]
+            self._robot = bullet.loadURDF(path, useFixedBase=1, physicsClientId=self.client)
+        count = bullet.getNumJoints(self._robot, self.client)
+        infos = [bullet.getJointInfo(self._robot, index, self.client) for index in range(count)]
         self._links = list(range(count))
         self._joints = [int(info[0]) for info in infos if info[3] >= 0]
         self._view: tuple[float, float, float] | None = None
@@ -93,12 +93,12 @@ class Window:
             time.sleep(due - now)
         began = time.perf_counter()
         with self._while_open(t):
-            self._draw(self._values(y))
+            self.draw(self._values(y))
             # A slow screen leaves half of the time to the motion.
             self._next = time.perf_counter() + max(FRAME, time.perf_counter() - began)
-            if SPACE in self._pressed():
+            if SPACE in self.pressed_keys():
                 stopped = time.perf_counter()
-                while SPACE not in self._pressed():
+                while SPACE not in self.pressed_keys():
                     time.sleep(FRAME)
                 self._start = self._start[0], self._start[1] + time.perf_counter() - stopped
 
@@ -106,28 +106,29 @@ class Window:
         """Keep the last pose in sight until somebody closes the window or presses Escape."""
         with suppress(bullet.error):
             if self._last is not None:
-                self._draw(self._values(self._last))
-            while bullet.isConnected(self._client) and ESCAPE not in self._pressed():
+                self.draw(self._values(self._last))
+            while bullet.isConnected(self.client) and ESCAPE not in self.pressed_keys():
                 time.sleep(FRAME)
 
     def close(self) -> None:
         """Close the window; any number of times."""
-        if self._client >= 0 and bullet.isConnected(self._client):
+        if self.client >= 0 and bullet.isConnected(self.client):
             with muted(1):
-                bullet.disconnect(self._client)
-        self._client = -1
+                bullet.disconnect(self.client)
+        self.client = -1
 
     @contextmanager
     def _while_open(self, t: float) -> Iterator[None]:
         try:
             yield
         except bullet.error:
-            if bullet.isConnected(self._client):
+            if bullet.isConnected(self.client):
                 raise
             raise SimulationError(f"the window was closed at t = {t:.3g} s, before the motion had ended") from None
 
-    def _draw(self, values: Sequence[float]) -> None:
-        client = self._client
+    def draw(self, values: Sequence[float]) -> None:
+        """Show the robot with these joint values."""
+        client = self.client
         rest = [(0.0,)] * len(values)
         bullet.resetJointStatesMultiDof(self._robot, self._joints, [(x,) for x in values], rest, client)
         if not self._links:
@@ -144,11 +145,12 @@ class Window:
     def _asked(self) -> tuple[float, float, float] | None:
         """The view that somebody has turned to; None as long as it is that of the start."""
         # PyBullet tells of the first world only, and for some pictures yet what was before.
-        if self._client != 0:
+        if self.client != 0:
             return None
-        yaw, pitch, distance = bullet.getDebugVisualizerCamera(self._client)[8:11]
+        yaw, pitch, distance = bullet.getDebugVisualizerCamera(self.client)[8:11]
         return None if (yaw, pitch, distance) == BULLETS_VIEW else (yaw, pitch, distance)
 
-    def _pressed(self) -> set[int]:
-        keys = bullet.getKeyboardEvents(self._client)
+    def pressed_keys(self) -> set[int]:
+        """Return the keys that were pressed since the last call."""
+        keys = bullet.getKeyboardEvents(self.client)
         return {key for key, state in keys.items() if state & bullet.KEY_WAS_TRIGGERED}

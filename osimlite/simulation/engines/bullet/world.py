@@ -98,14 +98,14 @@ class World:
         with temporary_file(robot_text(robot), files) as path:
             self.id = bullet.loadURDF(path, useFixedBase=1, flags=self.FLAGS, physicsClientId=client)
         infos = [bullet.getJointInfo(self.id, index, client) for index in range(bullet.getNumJoints(self.id, client))]
-        self.joints = self._by_name(robot, infos)
+        self.joints = self.sort_joints(robot, infos)
         self._indices = [int(info[0]) for info in infos if info[3] >= 0]
         self._release(infos)
         if self.impossible and self._exact:
-            self._set_inertias(robot, infos)
+            self.set_inertias(robot, infos)
 
     @staticmethod
-    def _by_name(robot: Robot, infos: Sequence[Sequence[Any]]) -> list[RobotJoint]:
+    def sort_joints(robot: Robot, infos: Sequence[Sequence[Any]]) -> list[RobotJoint]:
         """The joints in Bullet's order, which is not that of the model nor of the robot."""
         joints = {joint.name: joint for joint in robot.moving}
         return [joints[info[1].decode()] for info in infos if info[3] >= 0]
@@ -123,9 +123,9 @@ class World:
                 maxJointVelocity=self.FASTEST,
                 physicsClientId=client,
             )
-        self._switch_motors_off()
+        self.switch_motors_off()
 
-    def _switch_motors_off(self) -> None:
+    def switch_motors_off(self) -> None:
         """Bullet starts every joint with a motor that holds it."""
         if self._indices:
             none = [0.0] * len(self._indices)
@@ -133,7 +133,7 @@ class World:
                 self.id, self._indices, bullet.VELOCITY_CONTROL, forces=none, physicsClientId=self.client
             )
 
-    def _set_inertias(self, robot: Robot, infos: Sequence[Sequence[Any]]) -> None:
+    def set_inertias(self, robot: Robot, infos: Sequence[Sequence[Any]]) -> None:
         """Give Bullet the inertias that it refuses to read; only its articulated-body algorithm takes them."""
         links = {link.name: link for link in robot.links}
         for info in infos:

@@ -50,7 +50,7 @@ def test_nothing_is_damped(mechanism, monkeypatch):
 
 def test_no_motor_brakes(mechanism, monkeypatch):
     assert error(mechanism) < 1e-12
-    monkeypatch.setattr(World, "_switch_motors_off", lambda self: None)
+    monkeypatch.setattr(World, "switch_motors_off", lambda self: None)
     assert error(mechanism) > 1e-3
 
 
@@ -108,10 +108,10 @@ def test_an_inertia_that_no_body_has_is_kept(monkeypatch, capfd):
     # Nor does Bullet complain, since it never sees it.
     assert capfd.readouterr() == ("", "")
     with monkeypatch.context() as without:
-        without.setattr(World, "_set_inertias", lambda *_: None)
+        without.setattr(World, "set_inertias", lambda *_: None)
         assert error(mechanism, "articulated-body", **state) > 1e-3
     with monkeypatch.context() as without:
-        without.setattr(pack_chain, "_excesses", lambda *_: [])
+        without.setattr(pack_chain, "list_excesses", lambda *_: [])
         assert error(mechanism, "mass-matrix", **state) > 1e-3
     monkeypatch.setattr(bullet_world, "excess", lambda link: 0.0)
     monkeypatch.setattr(bullet_file, "excess", lambda link: 0.0)
@@ -166,7 +166,7 @@ def parameters(client):
 
 def test_no_sub_steps(mechanism):
     with BulletEngine(mechanism, Forces(())) as engine:
-        assert parameters(engine._body.client)["numSubSteps"] == 0
+        assert parameters(engine.world.client)["numSubSteps"] == 0
 
 
 def test_slow_motion_does_not_fall_asleep(monkeypatch):
@@ -181,13 +181,13 @@ def test_slow_motion_does_not_fall_asleep(monkeypatch):
 def test_joints_are_matched_by_name(mechanism, monkeypatch):
     assert error(mechanism, "mass-matrix") < 1e-12
     assert error(mechanism) < 1e-12
-    monkeypatch.setattr(World, "_by_name", staticmethod(lambda robot, infos: list(robot.moving)))
+    monkeypatch.setattr(World, "sort_joints", staticmethod(lambda robot, infos: list(robot.moving)))
     assert error(mechanism) > 1e-3
 
 
 def test_worlds_do_not_disturb_each_other(mechanism):
     with BulletEngine(mechanism, Forces(())) as first, BulletEngine(mechanism, Forces(())) as second:
-        assert first._body.client != second._body.client
+        assert first.world.client != second.world.client
         ours = first.acceleration(0.0, Q, U)
         second.acceleration(0.0, [0.0] * 8, [0.0] * 8)
         assert first.acceleration(0.0, Q, U) == ours
@@ -195,7 +195,7 @@ def test_worlds_do_not_disturb_each_other(mechanism):
 
 def test_nothing_collides(mechanism):
     with BulletEngine(mechanism, Forces(())) as engine:
-        body = engine._body
+        body = engine.world
         for link in range(-1, bullet.getNumJoints(body.id, body.client)):
             assert not bullet.getCollisionShapeData(body.id, link, body.client)
 
@@ -212,7 +212,7 @@ def test_bodies_can_be_seen(walker, mechanism):
     from osimlite.robot.visuals import collect_visuals
 
     with BulletEngine(mechanism, Forces(()), visuals=collect_visuals(walker, mechanism)) as engine:
-        shapes = bullet.getVisualShapeData(engine._body.id, physicsClientId=engine._body.client)
+        shapes = bullet.getVisualShapeData(engine.world.id, physicsClientId=engine.world.client)
         # Platform, pelvis, two thighs and two shanks.
         assert len(shapes) == 6
         assert np.abs(np.subtract(engine.acceleration(0.0, Q, U), mechanism.acceleration(Q, U))).max() < 1e-9

@@ -40,7 +40,7 @@ def clock(monkeypatch):
 def keys(monkeypatch):
     """What is pressed at each look at the keyboard, the first first; then nothing."""
     pressed: list[set[int]] = []
-    monkeypatch.setattr(module.Window, "_pressed", lambda self: pressed.pop(0) if pressed else set())
+    monkeypatch.setattr(module.Window, "pressed_keys", lambda self: pressed.pop(0) if pressed else set())
     return pressed
 
 
@@ -48,13 +48,13 @@ def keys(monkeypatch):
 def drawn(clock, monkeypatch):
     """When which pose was drawn."""
     poses: list[tuple[float, list[float]]] = []
-    real = module.Window._draw
+    real = module.Window.draw
 
     def spy(self, values):
         poses.append((clock.now, list(values)))
         real(self, values)
 
-    monkeypatch.setattr(module.Window, "_draw", spy)
+    monkeypatch.setattr(module.Window, "draw", spy)
     return poses
 
 
@@ -75,7 +75,7 @@ def test_the_motion_takes_its_time_in_sixty_pictures_a_second(clock, keys, drawn
 
 
 def _moving(simulation):
-    return [joint.name for joint in simulation.engine._body.joints]
+    return [joint.name for joint in simulation.engine.world.joints]
 
 
 def test_space_stops_and_goes_on(clock, keys, drawn):
@@ -127,7 +127,7 @@ def test_the_camera_follows_and_stays_as_it_was_turned(clock, keys, monkeypatch)
         bullet, "getDebugVisualizerCamera", lambda _: (0,) * 8 + (tuple(answers.pop()) if answers else tuple(turned))
     )
     simulation, _ = _shown()
-    is_first = simulation.engine._window._client == 0
+    is_first = simulation.engine.window.client == 0
     simulation.close()
     assert 0.5 < views[0][2] < 5.0 and views[0] == views[3]
     assert targets[-1] != targets[0] and 0.0 < targets[0][1] < 1.0
@@ -138,14 +138,14 @@ def test_the_camera_follows_and_stays_as_it_was_turned(clock, keys, monkeypatch)
 def test_a_window_that_is_closed_ends_the_motion(clock, keys, drawn, monkeypatch):
     simulation = Simulation(dynamic_walker(), show=True)
     with simulation:
-        real, client = module.Window._draw, simulation.engine._window._client
+        real, client = module.Window.draw, simulation.engine.window.client
 
         def closed(self, values):
             if clock.now > 0.2:
                 bullet.disconnect(client)
             real(self, values)
 
-        monkeypatch.setattr(module.Window, "_draw", closed)
+        monkeypatch.setattr(module.Window, "draw", closed)
         with pytest.raises(SimulationError, match=r"the window was closed at t = 0\.2"):
             simulation.run(0.5, fixed_step=1e-3)
         simulation.hold()
