@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from tests.quick_cases import QUICK_CASES
+
 HOW = "`pytest --full` runs them"
 _ANSWER = "tests_of_the_full_suite"
 _state = {"full": False, "deselected": 0}
@@ -34,8 +36,10 @@ class Suite:
             return "suite: full"
         return f"suite: quick, without the tests marked `full`; {HOW}"
 
+    @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
         """Deselect the tests of the full suite."""
+        _mark_cases(config, items)
         if is_full():
             return
         slow = [item for item in items if item.get_closest_marker("full")]
@@ -66,6 +70,26 @@ class Suite:
             terminalreporter.stats.setdefault("deselected", [SimpleNamespace()] * _state["deselected"])
             for line in _describe(_state["deselected"]):
                 terminalreporter.write_line(line)
+
+
+def _mark_cases(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark the cases of expensive tests that the quick suite does not take.
+
+    Raises:
+        UsageError: a case that it should take does not exist.
+    """
+    seen: dict[str, set[str]] = {}
+    for item in items:
+        function, _, case = item.nodeid.partition("[")
+        if function in QUICK_CASES:
+            seen.setdefault(function, set()).add(case.removesuffix("]"))
+            if case.removesuffix("]") not in QUICK_CASES[function]:
+                item.add_marker("full")
+    if not any("::" in str(word) for word in config.args):
+        for function, cases in seen.items():
+            lost = set(QUICK_CASES[function]) - cases
+            if lost and cases != {"absent"}:
+                raise pytest.UsageError(f"tests/quick_cases.py: {function} has no case {', '.join(sorted(lost))}")
 
 
 def _describe(count: int) -> list[str]:

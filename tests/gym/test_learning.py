@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 gymnasium = pytest.importorskip("gymnasium", reason="needs gymnasium (extra 'gym')")
-cma = pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
 
 import osimlite.gym  # noqa: E402, F401
 
 
 @pytest.mark.full
 def test_the_arm_learns_to_hold_the_weight() -> None:
+    # Not above: each process that collects this module would load it, which takes seconds.
+    cma = pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
     envs = gymnasium.make_vec("osimlite/Arm-v0", num_envs=4)
     size = envs.single_observation_space.shape[0]
 

@@ -28,6 +28,15 @@ finally:
 """One object of each class, as OpenSim makes it before it has read any file: made while tests are collected."""
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave Bullet beside OpenSim on many models to the full suite; tests/simulation/ has it on recorded motions."""
+    for item in items:
+        parameters = getattr(getattr(item, "callspec", None), "params", {})
+        engines = [value for value in parameters.values() if isinstance(value, str)]
+        if item.path.name in ("test_constrained_simulation.py", "test_corpus_motions.py") and "bullet" in engines:
+            item.add_marker("full")
+
+
 @pytest.fixture(scope="module", autouse=True)
 def opensims_defaults() -> None:
     """A `<defaults>` block of a file holds for the whole process, in OpenSim: each module starts with its own."""

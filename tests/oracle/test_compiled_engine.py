@@ -7,11 +7,12 @@ import pytest
 
 import osimlite
 from osimlite.simulation import Simulation
+from tests.suite import choose
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
-UNTIL, ACCURACY, STARTS = 1.0, 1e-9, 20
+UNTIL, ACCURACY, STARTS = 1.0, 1e-9, choose(2, 20)
 
 
 @pytest.fixture(scope="module")

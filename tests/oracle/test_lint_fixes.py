@@ -66,6 +66,7 @@ DAMAGE = (
 )
 
 
+@pytest.mark.full
 def test_safe_mends_of_damaged_real_files_give_the_models_back(corpus, tmp_path):
     draw = random.Random(7)
     wrong, mends = [], 0

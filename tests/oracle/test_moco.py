@@ -118,6 +118,7 @@ print(json.dumps([terms, found.success, found.parameters["mass"], min(apart), ma
 """
 
 
+@pytest.mark.full
 def test_frames_and_expressions(tmp_path):
     """After one of its iterations Moco's costs of frames, steps and parameters are those that are found here."""
     osim = pytest.importorskip("opensim")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -16,7 +17,9 @@ from osimlite.sweep.plan import plan
 from osimlite.sweep.run import Interrupted
 from osimlite.sweep.search import METHODS, BudgetExhausted, Search
 
-pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
+# Not loaded here: that takes seconds, in each process that collects this module.
+if find_spec("cma") is None:
+    pytest.skip("needs cma (extra 'optimize')", allow_module_level=True)
 pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
 VARY = {"RHip_rz": (0.2, 0.9), "Pelvis_tx/speed": (0.0, 2.0), "/bodyset/Pelvis/mass": (1.0, 3.0)}
 DISTANCE = Objective("distance")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 import numpy as np
 import pytest
 
@@ -18,7 +20,9 @@ from osimlite.sweep.optimize import Objective, optimize
 from osimlite.sweep.plan import plan
 from osimlite.sweep.runner import Runner
 
-pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
+# Not loaded here: that takes seconds, in each process that collects this module.
+if find_spec("cma") is None:
+    pytest.skip("needs cma (extra 'optimize')", allow_module_level=True)
 VARY = {"RHip_rz": (-0.5, 0.5), "LHip_rz/speed": (-4.0, 4.0), "LKnee_rz": (-1.0, 0.0)}
 MODELS = {**VARY, "/contactgeometryset/*Foot*/radius": (0.04, 0.06)}
 
