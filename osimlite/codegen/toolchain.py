@@ -99,12 +99,14 @@ class Compiler(NamedTuple):
         """
         flags = ["-shared", *self._architectures()]
         if self.system == "linux":
-            # Nothing of the library of C++ is used.
             flags += ["-Wl,--as-needed", "-s"]
         elif self.system == "win32":
             # Two builds of the same text are equal to the last byte.
             is_gnu = self.is_gcc or "ziglang" in self.command
             flags += ["-Wl,--no-insert-timestamp"] if is_gnu else ["-Wl,/Brepro"]
+        if not self.is_gcc and (self.system != "win32" or "ziglang" in self.command):
+            # Nothing of the library of C++ is used, which zig would compile first.
+            flags.append("-nostdlib++")
         folder = objects[0].parent
         names = [os.path.relpath(item, folder) for item in objects]
         self._run([*flags, *names, "-o", str(result.resolve())], folder)
