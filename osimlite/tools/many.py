@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from glob import has_magic
@@ -101,7 +101,7 @@ def run_many(
     Args:
         setups: the files.
         output: a folder for all results, with one in it for each setup, named after the setup's place among them; one
-            that needs what another makes is not run then.
+            that names what another makes is given that from there.
         workers: processes of this machine; by default all is done in this one; None for one for each core.
         cluster: address of a Dask scheduler whose workers do it instead; they see the same files.
         resume: leave out what an earlier run has done, if its inputs and its results are still there unchanged.
@@ -119,8 +119,8 @@ def run_many(
     """
     journal = _Journal(output or Path(), resume, is_kept=len(setups) > 1)
     places = places_of(setups, output)
-    work = _Work(setups, journal, progress, apart=output is not None)
-    do = partial(_one, places, kept, overwrite, write_outside)
+    work = _Work(setups, journal, progress)
+    do = partial(_one, places, work.needs, kept, overwrite, write_outside)
     try:
         if cluster is None and workers == 1:
             for setup in work.ready():
@@ -161,8 +161,30 @@ def places_of(setups: Sequence[Path], output: Path | None) -> dict[Path, Path | 
     }
 
 
+def find_substitutes(setup: Path, needs: Sequence[Path], places: Mapping[Path, Path | None]) -> dict[str, str]:
+    """Return where files that a setup names are now, if others have made them and put them elsewhere.
+
+    Args:
+        setup: that names the files.
+        needs: setups that make them.
+        places: by setup, the folder of its results; None if these are where the setup says.
+    """
+    result = {}
+    named = {os.path.realpath(name) for name in named_files(str(setup), "file")}
+    for maker in needs:
+        folder = places[maker]
+        if folder is None:
+            continue
+        for path in named & {os.path.realpath(name) for name in named_files(str(maker), "output-file")}:
+            new = folder / os.path.basename(path)
+            if new.is_file():
+                result[path] = str(new.absolute())
+    return result
+
+
 def _one(
     places: dict[Path, Path | None],
+    needs: dict[Path, list[Path]],
     kept: dict[str | Path, Outcome] | None,
     overwrite: bool,
     write_outside: bool,
@@ -172,7 +194,14 @@ def _one(
     started = time.perf_counter()
     try:
         digest = digest_of(setup)
-        outcome = run(setup, places[setup], overwrite=overwrite, write_outside=write_outside)
+        substitutes = find_substitutes(setup, needs[setup], places)
+        outcome = run(
+            setup,
+            places[setup],
+            overwrite=overwrite,
+            write_outside=write_outside,
+            substitutes=substitutes,
+        )
     except OsimliteError as error:
         return Trial(str(setup), FAILED, message=str(error), seconds=time.perf_counter() - started)
     if kept is not None:
@@ -287,12 +316,10 @@ class _Work:
         setups: Sequence[Path],
         journal: _Journal,
         progress: Callable[[int, int], object] | None,
-        *,
-        apart: bool,
     ) -> None:
-        self.setups, self.journal, self.progress, self._are_apart = setups, journal, progress, apart
+        self.setups, self.journal, self.progress = setups, journal, progress
         self.trials: dict[Path, Trial] = {}
-        self._needs = _needs(setups)
+        self.needs = _needs(setups)
         self._given: set[Path] = set()
 
     def ready(self) -> Iterator[Path]:
@@ -301,17 +328,13 @@ class _Work:
         while moved:
             moved = False
             for setup in self.setups:
-                if setup in self._given or not all(one in self.trials for one in self._needs[setup]):
+                if setup in self._given or not all(one in self.trials for one in self.needs[setup]):
                     continue
                 moved = True
                 self._given.add(setup)
-                needed = [str(one) for one in self._needs[setup]]
+                needed = [str(one) for one in self.needs[setup]]
                 broken = [one for one in needed if self.trials[Path(one)].status in (FAILED, WAITED)]
-                if needed and self._are_apart:
-                    # What is where it looks for it is missing, or left from another run.
-                    message = f"it needs what {listed(needed)} makes, and -o puts that elsewhere; leave out -o"
-                    self.note(Trial(str(setup), WAITED, message=message))
-                elif broken:
+                if broken:
                     message = f"it needs what {listed(broken)} should have made"
                     self.note(Trial(str(setup), WAITED, message=message))
                 elif (trial := self.journal.done(setup)) is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,7 +22,9 @@ from osimlite.lint.rules.values import KEEPS_DEFAULT
 from osimlite.lint.setup import Setup
 from osimlite.lint.suffixes import is_table
 from osimlite.multibody.extremes import any_numbers
+from osimlite.schema.base import Object
 from osimlite.schema.registry import MODULES
+from osimlite.schema.specs import file_specs
 from osimlite.text import counted, listed
 from osimlite.tools.job import Job, NotRunnable
 from osimlite.tools.named_files import expect_few
@@ -66,6 +68,7 @@ def run(
     simulates: bool = False,
     overwrite: bool = False,
     write_outside: bool = False,
+    substitutes: Mapping[str, str] | None = None,
 ) -> Outcome:
     """Run the setup of a tool as OpenSim would, and write the files that it would write.
 
@@ -82,6 +85,7 @@ def run(
             told how far that is from what was found.
         overwrite: whether any file may be replaced; without it only results of the same kind are.
         write_outside: whether the setup may name results outside of its project and the current folder.
+        substitutes: by absolute path of an input that the setup names, the path of the file that is read instead.
 
     Returns:
         The tables that were written, as they were before they were rounded to the digits of the files, and a summary.
@@ -101,10 +105,11 @@ def run(
     if refine is not None and not tag.startswith("Moco"):
         raise SettingError(f"a {tag} has no mesh to refine; leave out --refine")
     outcome = Outcome(progress=progress)
+    replaced = substitute_inputs(top, file.parent, substitutes or {})
     if check:
         away: dict[str, None] = {}
         report = merged(_reports(str(file), away))
-        if errors := [e for e in report.errors if not _is_run_by_opensim(e)]:
+        if errors := [e for e in report.errors if not (_is_run_by_opensim(e) or _is_about_any(e, replaced))]:
             raise FaultySetup(Report(errors, report.texts))
         if away:
             outcome.tell("taken from here", f"{listed(away)}, not beside the setup")
@@ -127,6 +132,42 @@ def run(
             error.message += f"; run '{from_folder(maker, Path.cwd())}' first, which should make it"
         raise
     return outcome
+
+
+def substitute_inputs(top: Object, folder: Path, substitutes: Mapping[str, str]) -> list[str]:
+    """Have a document name other files in the place of some of its inputs.
+
+    Args:
+        top: the document, which is changed.
+        folder: that its paths go from.
+        substitutes: by absolute path of an input, that of the file in its place.
+
+    Returns:
+        The names that were replaced, as the document had them.
+    """
+    replaced: list[str] = []
+
+    def substitute(name: str) -> str:
+        new = substitutes.get(os.path.realpath(folder / name.strip())) if name.strip() else None
+        if new is None:
+            return name
+        replaced.append(name.strip())
+        return new
+
+    for item in top.walk() if substitutes else ():
+        for spec in file_specs(type(item), "file"):
+            value = getattr(item, spec.name)
+            if isinstance(value, str):
+                setattr(item, spec.name, substitute(value))
+            elif isinstance(value, tuple):
+                setattr(item, spec.name, tuple(substitute(str(name)) for name in value))
+    return replaced
+
+
+def _is_about_any(error: Finding, names: Sequence[str]) -> bool:
+    """Whether an error is about one of some files: missing or old, as others are read in the place of these."""
+    own = os.path.basename(error.file or "")
+    return any(f"'{name}'" in error.message or own == os.path.basename(name) for name in names)
 
 
 def _is_run_by_opensim(error: Finding) -> bool:

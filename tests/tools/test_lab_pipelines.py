@@ -216,3 +216,30 @@ def test_inverse_dynamics_of_columns_by_paths(tmp_path: Path) -> None:
     result = osimlite.run(folder / "id.xml", folder / "two")
     assert (next(iter(result.tables.values())).rows == by_path.rows).all()
     assert "columns" not in dict(result.told)
+
+
+CHAINED = """<OpenSimDocument Version="40600"><InverseDynamicsTool name="id"><results_directory>.</results_directory>
+<model_file>leg.osim</model_file><time_range>0 0.05</time_range><forces_to_exclude>Muscles</forces_to_exclude>
+<coordinates_file>{folder}ik.mot</coordinates_file>
+<lowpass_cutoff_frequency_for_coordinates>-1</lowpass_cutoff_frequency_for_coordinates>
+<output_gen_force_file>id.sto</output_gen_force_file></InverseDynamicsTool></OpenSimDocument>"""
+
+
+@pytest.mark.parametrize("stale", [False, True])
+@pytest.mark.parametrize("folder_name", ["", "results/"])
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_results_put_elsewhere_are_found(tmp_path: Path, stale: bool, folder_name: str, workers: str) -> None:
+    """A setup reads what another has made into the folder of -o, also where an old file is in the usual place."""
+    folder = copy_lab("unseen", tmp_path)
+    change(folder / "ik.xml", ("<output_motion_file>ik.mot<", f"<output_motion_file>{folder_name}ik.mot<"))
+    (folder / "results").mkdir()
+    (folder / "id.xml").write_text(CHAINED.format(folder=folder_name))
+    expected = osimlite.run(folder / "ik.xml", tmp_path / "one").tables["ik.mot"]
+    if stale:
+        old = (tmp_path / "one" / "ik.mot").read_text().splitlines()
+        (folder / folder_name / "ik.mot").write_text("\n".join([*old[:-2], ""]))
+    done = run("run", "id.xml", "ik.xml", "-o", "out", "--workers", workers, folder=folder)
+    assert done.code == 0, done.out + done.err
+    moments = read_sto(folder / "out" / "id" / "id.sto")
+    assert moments.times.tolist() == pytest.approx(expected.times.tolist())
+    assert (folder / folder_name / "ik.mot").exists() == stale
