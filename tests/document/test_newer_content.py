@@ -50,3 +50,12 @@ def test_a_real_document_states_its_version(corpus_model):
         assert "came with" not in str(error)
     except osimlite.OsimliteError:
         pytest.skip("it is no document")
+
+
+def test_an_old_controller_that_names_an_actuator_twice_is_said_to_be_refused():
+    text = small_model(
+        forces='<CoordinateActuator name="m"><coordinate>q</coordinate></CoordinateActuator>',
+        controllers='<PrescribedController name="c"><actuator_list>m m</actuator_list></PrescribedController>',
+    ).replace("40600", "40000")
+    report = validate(Source(text.encode(), "m.osim"))
+    assert any("names an actuator twice" in finding.message for finding in report.errors), str(report)

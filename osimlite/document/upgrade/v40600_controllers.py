@@ -35,6 +35,9 @@ def controller_actuators(draft: Draft) -> None:
                 lost = "that it drives all actuators, which a document without the model cannot name"
         else:
             paths = [by_name.get(word, f"/forceset/{word}") for word in words]
+            known = [path for path in paths if path in {*by_name.values()}]
+            if len({*known}) < len(known):
+                draft.refuse(controller, names, "a controller names an actuator twice")
         names.text = " ".join(dict.fromkeys(paths))
         draft.rename(names, "socket_actuators")
         draft.changed(controller, lost=lost)

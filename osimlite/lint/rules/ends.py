@@ -43,7 +43,8 @@ def ends_in_one_place(subject: Subject, report: FindingSink) -> None:
     for force, first, second in _two_ended(subject):
         if not getattr(force, "appliesForce", True):
             continue
-        ends = [_place_in_ground(subject, frame, point) for frame, point in (first, second)]
+        # OpenSim takes the points in the body itself, also where a frame that is off it is named.
+        ends = [_place_in_ground(subject, base_of(subject, frame), point) for frame, point in (first, second)]
         if ends[0] is None or ends[1] is None:
             continue
         if norm(plus(ends[0], times(-1.0, ends[1]))) < NO_LENGTH_M:
