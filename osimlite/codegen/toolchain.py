@@ -35,6 +35,12 @@ GCC = (
     "--param=inline-unit-growth=300", "--param=large-function-growth=1000",
 )  # fmt: skip
 
+CLANG = (
+    # Clang inlines less what several kernels call: with its own limit an evaluation of gait2392 takes 16.1 instead of
+    # 13.9 us. Compiling takes a tenth longer.
+    "-mllvm", "-inline-threshold=500",
+)  # fmt: skip
+
 
 class CompilationError(OsimliteError):
     """A compiler failed, or a kernel cannot be translated for it."""
@@ -63,7 +69,9 @@ class Compiler(NamedTuple):
         """Return the options that decide the machine code."""
         # On x86-64 the baseline is for processors of before 2013: it is compiled in a third of the time.
         is_quick = target == BASELINE and self.machine == "x86_64"
-        flags = [*COMMON, "-O2" if is_quick else "-O3", *(GCC if self.is_gcc and not is_quick else ())]
+        flags = [*COMMON, "-O2" if is_quick else "-O3"]
+        if not is_quick and "ziglang" not in self.command:
+            flags += GCC if self.is_gcc else CLANG
         if target == X86_64_V3:
             # Zig has names of its own for processors.
             flags.append("-mcpu=x86_64_v3" if "ziglang" in self.command else "-march=x86-64-v3")

@@ -7,7 +7,7 @@ is too large for a float.
 
 from __future__ import annotations
 
-from math import acos, asin, atan, copysign, cos, cosh, erf, erfc, exp, floor, inf, log, nan, sin, sinh, sqrt, tan, tanh
+from math import acos, asin, atan, copysign, cos, cosh, erf, erfc, exp, inf, log, nan, sin, sinh, sqrt, tan, tanh
 
 FUNCTIONS = {
     "sqrt": "square_root",
@@ -56,7 +56,8 @@ def power(a: float, b: float) -> float:
         return 1.0 if b == 0.0 else inf if b < 0.0 else 0.0
     if a != a or b != b:
         return nan
-    if a < 0.0 and (b - b != 0.0 or b != floor(b)):
+    # The remainder stays a float: where floor() gives an integer of 64 bits, b may be too large for it.
+    if a < 0.0 and (b - b != 0.0 or b % 1.0 != 0.0):
         return nan
     size = inf if b * log(abs(a)) > 709.78 else abs(a) ** b
     return -size if a < 0.0 and b % 2.0 == 1.0 else size

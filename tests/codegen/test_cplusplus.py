@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 import os
 
@@ -9,6 +10,7 @@ import pytest
 
 from osimlite.codegen.cplusplus import write_library, write_units
 from osimlite.codegen.reader import TranslationError
+from osimlite.forces.formulas import power
 from osimlite.kernels.pointers import Floats, Ints
 from tests.codegen import constructs, refused
 from tests.codegen.compiled import are_same_bits, call_library, call_python, compile_text, needs_compiler
@@ -55,6 +57,14 @@ def test_floats_beyond_integers_saturate(tmp_path):
     assert result[:2] == [largest, [0, largest, least, least]]
     result = call_library(library, "convert", [0] * 4, [2.0**62, -1.5, 9.99, -0.0], 0)
     assert result[:2] == [2**62, [2**62, -1, 9, 0]]
+
+
+@needs_compiler
+def test_powers_by_floats_beyond_integers(tmp_path):
+    library = compile_text(tmp_path, write_library({"power": (power, 0)}))
+    library.power.restype, library.power.argtypes = ctypes.c_double, [ctypes.c_double] * 2
+    for a, b in ((-0.5, 1e300), (-1.0, 1e19), (-2.0, 3.0), (-2.0, 2.5), (-3.0, -2.0), (2.0, math.inf)):
+        assert are_same_bits(library.power(a, b), power(a, b)), (a, b)
 
 
 def divide(s: Ints, x: Floats, out: Floats, count: int) -> int:

@@ -61,6 +61,11 @@ class Library:
         """Names of the functions that each function or exported symbol calls."""
         self._writing: list[str] = []
 
+    @property
+    def specialisations(self) -> list[Specialisation]:
+        """The functions whose types were inferred, of which some may not be called in the end."""
+        return [*self._specialisations.values()]
+
     # -------------------------------------------------------------------------------------------------- writing
     def export(self, symbol: str, function: Callable[..., Any], directions: int) -> None:
         """Write a function with all that it calls, and make it visible outside of the library.
