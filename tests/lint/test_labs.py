@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import osimlite
+from tests.cli.command import run
 from tests.labs import change, copy_lab
 
 
@@ -136,3 +137,9 @@ def test_motions_by_paths_are_a_warning(tmp_path: Path, label: str) -> None:
     report = osimlite.validate(folder / "id.xml")
     assert not report.errors
     assert any(finding.code == "OSIM842" and "by paths" in finding.message for finding in report.findings)
+
+
+def test_a_trial_check_names_ground_that_pushes_twice(tmp_path: Path) -> None:
+    folder = copy_lab("ground", tmp_path)
+    done = run("check-trial", ".", folder=folder)
+    assert "OSIM859" in done.out

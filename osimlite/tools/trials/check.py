@@ -39,8 +39,8 @@ from osimlite.tools.trials.muscles import passive_numbers
 
 NAMES = {"RRATool": "RRA", "CMCTool": "CMC", "AnalyzeTool": "static optimization"}
 """Of tools whose actuators are looked at."""
-IN_SETUPS = ("OSIM844", "OSIM845", "OSIM846", "OSIM849")
-"""Rules about setups that ask the same: times, filters and loads."""
+IN_SETUPS = ("OSIM844", "OSIM845", "OSIM846", "OSIM849", "OSIM857", "OSIM858", "OSIM859")
+"""Rules about setups that ask the same: times, filters, units and loads."""
 
 
 @dataclass(slots=True)
