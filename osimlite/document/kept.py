@@ -29,7 +29,8 @@ class Kept(Generic[T]):
 
     def __call__(self, path: str) -> T | None:
         """What the file at a path makes."""
-        stamp, place = stamped(path), os.path.normpath(path)
+        # A file is the same by a relative and by an absolute path.
+        stamp, place = stamped(path), os.path.abspath(path)
         if stamp is None:
             return None
         known = self._kept.pop(place, None)
@@ -42,8 +43,18 @@ class Kept(Generic[T]):
 
     def has(self, path: str) -> bool:
         """Whether it is known of a file as it is now."""
-        known = self._kept.get(os.path.normpath(path))
+        known = self._kept.get(os.path.abspath(path))
         return known is not None and known[0] == stamped(path)
+
+    def keep(self, path: str, made: T) -> None:
+        """Keep what somebody else has made of the file at a path, as it is now."""
+        stamp, place = stamped(path), os.path.abspath(path)
+        if stamp is None:
+            return
+        self._kept.pop(place, None)
+        self._kept[place] = stamp, made
+        if len(self._kept) > self._size:
+            del self._kept[next(iter(self._kept))]
 
 
 def while_unchanged(size: int) -> Callable[[Callable[[str], T]], Kept[T]]:

@@ -7,13 +7,24 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from osimlite.document.kept import while_unchanged
 from osimlite.errors import DocumentError
+from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.engine import subject_of
 from osimlite.lint.setup import Setup
 
 MAX_DOCUMENTS = 500
 """Documents that one setup may name, directly or through others. Real setups name about ten."""
+
+
+@while_unchanged(64)
+def read_subject(path: str) -> Checked:
+    """Return a document as the linter sees it, read once as long as its file does not change.
+
+    Only what it names may be asked of it: what the linter finds depends on other files too.
+    """
+    return subject_of(path, Config())
 
 
 def named_files(setup: str, rule: str) -> Iterator[str]:
@@ -33,7 +44,10 @@ def named_files(setup: str, rule: str) -> Iterator[str]:
     waiting = deque([setup])
     while waiting:
         file = waiting.popleft()
-        subject = subject_of(file, Config())
+        subject = read_subject(file)
+        if subject is None:
+            # The error says that the file is missing.
+            subject = subject_of(file, Config())
         if not isinstance(subject, Setup):
             continue
         for item in subject.named_files(rule):

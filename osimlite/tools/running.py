@@ -27,7 +27,7 @@ from osimlite.schema.registry import MODULES
 from osimlite.schema.specs import file_specs
 from osimlite.text import counted, listed
 from osimlite.tools.job import Job, NotRunnable
-from osimlite.tools.named_files import expect_few
+from osimlite.tools.named_files import expect_few, read_subject
 from osimlite.tools.outcome import Outcome
 from osimlite.writing import ResultWriter
 
@@ -200,6 +200,7 @@ def _reports(setup: str, away: dict[str, None]) -> Iterator[Report]:
     while waiting:
         file = waiting.popleft()
         subject = subject_of(file, settings_of(file).config_for(file, Config()))
+        read_subject.keep(file, subject)
         yield checked(subject, measure=False)
         if not isinstance(subject, Setup):
             continue

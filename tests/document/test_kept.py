@@ -82,3 +82,36 @@ def test_what_is_not_asked_for_is_refused_as_always(file: Path, tmp_path: Path) 
         kept.read_anew(file, ScaleTool)
     with pytest.raises(DocumentError, match="no such file"):
         kept.read_anew(tmp_path / "none.osim", Model)
+
+
+def test_a_file_is_the_same_by_every_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+
+    def make(path: str) -> str:
+        seen.append(path)
+        return Path(path).read_text()
+
+    known = kept.while_unchanged(2)(make)
+    (tmp_path / "one.txt").write_text("one")
+    monkeypatch.chdir(tmp_path)
+    assert known("one.txt") == known("./one.txt") == known(str(tmp_path / "one.txt")) == "one"
+    assert seen == ["one.txt"] and known.has("./one.txt")
+    # From another folder the same words name another file.
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner" / "one.txt").write_text("another")
+    monkeypatch.chdir(tmp_path / "inner")
+    assert known("one.txt") == "another" and known("../one.txt") == "one" and len(seen) == 2
+
+
+def test_what_somebody_else_has_made_is_kept(tmp_path: Path) -> None:
+    known = kept.while_unchanged(1)(lambda path: Path(path).read_text())
+    files = [tmp_path / "one.txt", tmp_path / "two.txt"]
+    for each in files:
+        each.write_text("read")
+        known.keep(str(each), "kept")
+    assert [known.has(str(each)) for each in files] == [False, True]
+    assert known(str(files[1])) == "kept"
+    files[1].write_text("something else")
+    assert known(str(files[1])) == "something else"
+    known.keep(str(tmp_path / "nothing.txt"), "kept")
+    assert known(str(tmp_path / "nothing.txt")) is None
