@@ -102,12 +102,18 @@ class Command:
     def __init__(self, function: Callable[..., None], more: Callable[[], Iterable[Choice]] = tuple) -> None:
         self.function, self._more = function, more
         self.__name__, self.__doc__, self.__module__ = function.__name__, function.__doc__, function.__module__
+        self._parameters: list[_Parameter] | None = None
 
     def __call__(self, *values: Any, **named: Any) -> None:
         self.function(*values, **{each.name: each.default for each in self._more()} | named)
 
     def parameters(self) -> list[_Parameter]:
-        """What the command takes, in the order of its help."""
+        """Return what the command takes, in the order of its help."""
+        if self._parameters is None:
+            self._parameters = self._read_parameters()
+        return self._parameters
+
+    def _read_parameters(self) -> list[_Parameter]:
         function: Any = self.function
         defaults = dict(zip(reversed([*_names(function)]), reversed(function.__defaults__ or ()), strict=False))
         result = []
@@ -144,6 +150,9 @@ class Command:
 
     def complete(self, words: Sequence[str]) -> list[str]:
         """Return the words of a command line, with a value after each option that may stand without one."""
+        # Most command lines have no option that could lack a value, and need no look at the parameters here.
+        if not any(word[:2] == "--" and following[0:1] == "-" for word, following in pairwise([*words, "-"])):
+            return [*words]
         bare_values = {
             spelling: each.declared.bare_value
             for each in self.parameters()
