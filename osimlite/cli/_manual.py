@@ -41,6 +41,7 @@ PAGES = {
     "osimlite.cli.upgrade": "docs/errors.md#versions",
     "osimlite.cli.validate": "docs/lint-in-ci.md",
     "osimlite.cli.view": "docs/viewer.md",
+    "osimlite.codegen": "docs/compiled.md",
     "osimlite.document": "docs/rules.md#text",
     "osimlite.document.data": "docs/yaml.md",
     "osimlite.document.plugins": "docs/plugin-classes.md",
@@ -52,12 +53,14 @@ PAGES = {
     "osimlite.lint.config": "docs/lint-in-ci.md#settings",
     "osimlite.lint.settings": "docs/lint-in-ci.md#settings",
     "osimlite.lsp": "docs/editors.md",
+    "osimlite.measuring": "docs/lint-in-ci.md#paths-and-muscles",
     "osimlite.meshes": "docs/viewer.md#meshes",
     "osimlite.models.source": "docs/errors.md#sources-of-models",
     "osimlite.modifying": "docs/modifying.md",
     "osimlite.multibody": "docs/constraints.md",
     "osimlite.multibody.assembly": "docs/constraints.md#the-start",
     "osimlite.multibody.mechanism": "docs/from-opensim.md#kinematics-and-dynamics",
+    "osimlite.reading": "docs/errors.md#files",
     "osimlite.reflexes": "docs/reflexes.md",
     "osimlite.optimal": "docs/optimal-control.md",
     "osimlite.project": "docs/lint-in-ci.md#settings",
@@ -97,6 +100,7 @@ PAGES = {
     "osimlite.translate": "docs/urdf.md",
     "osimlite.translate.mjcf": "docs/mujoco.md",
     "osimlite.view": "docs/viewer.md",
+    "osimlite.writing": "docs/errors.md#files",
 }
 """Pages and their headings, by the class of an error, or else by the module or package that could not go on.
 

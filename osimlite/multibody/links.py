@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -309,14 +310,22 @@ class LinkPacker:
             self.ints += DOF.record(ABOVE=freedom, ROW=self.room(depths[-1] + 1), DEPTH=depths[-1])
             self.entries += depths[-1] + 1
         self.ints[MODEL.SUMMED_AT] = len(self.ints)
-        summed = [number for number in range(len(above)) if not self.is_alone(number)]
+        summed = [number for number in range(len(above)) if number not in self.simple_freedoms]
         self.ints[MODEL.SUMMED] = len(summed)
         self.ints += summed
 
-    def is_alone(self, freedom: int) -> bool:
-        """Whether a degree of freedom is the amount of one operation, and nothing else."""
-        users = [item for item in self.operations if freedom in map(self.places.freedom, item.arguments)]
-        return len(users) == 1 and users[0].function is None and users[0].kind in (MOTION.TURN, MOTION.SLIDE)
+    @cached_property
+    def simple_freedoms(self) -> set[int]:
+        """Degrees of freedom that are the amount of one operation about or along one axis, and nothing else."""
+        users: dict[int, list[Operation]] = {}
+        for item in self.operations:
+            for freedom in {self.places.freedom(place) for place in item.arguments}:
+                users.setdefault(freedom, []).append(item)
+        return {
+            freedom
+            for freedom, (first, *others) in users.items()
+            if not others and first.function is None and first.kind in (MOTION.TURN, MOTION.SLIDE)
+        }
 
     def operation_records(self) -> None:
         """Write the operations, and what their functions need."""
@@ -340,7 +349,7 @@ class LinkPacker:
                 self.numbers += item.radii.tolist()
             elif item.function is None:
                 freedom = freedoms[0]
-                law = OPERATION.ALONE if self.is_alone(freedom) else OPERATION.TOGETHER
+                law = OPERATION.ALONE if freedom in self.simple_freedoms else OPERATION.TOGETHER
             else:
                 infos = [self.places.mechanism.coordinates[place] for place in item.arguments]
                 table = function_table(item.function, f"the function of an axis of the joint '{infos[0].joint}'")

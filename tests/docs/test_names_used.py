@@ -79,10 +79,12 @@ def check_python(code: str, names: dict[str, Any]) -> None:
                 names[alias.asname or alias.name] = resolve(
                     ast.Attribute(ast.Name("module"), alias.name), {"module": module}
                 )
+    # Within `try` a page shows which error a mistake raises.
+    shown_mistakes = {call for attempt in ast.walk(tree) if isinstance(attempt, ast.Try) for call in ast.walk(attempt)}
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute):
             resolve(node, names)
-        elif isinstance(node, ast.Call):
+        elif isinstance(node, ast.Call) and node not in shown_mistakes:
             check_keywords(node, resolve(node.func, names))
 
 

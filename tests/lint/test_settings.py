@@ -144,7 +144,8 @@ def test_a_baseline_hides_what_it_knows_and_no_more(tmp_path):
     old = validate(Source(TEXT.encode(), "m.osim"))
     assert write_baseline(path, old) == 2
     moved = Source(TEXT.replace("<foo/>", "\n\n<foo/><foo/>").encode(), "m.osim")
-    assert validate(moved).codes == {"OSIM505": 1, "OSIM101": 2}
+    # One finding counts all elements of an unknown name: one more of them makes another message.
+    assert validate(moved).codes == {"OSIM505": 1, "OSIM101": 1}
     assert without_baseline(path, validate(moved)).codes == {"OSIM101": 1}
     assert json.loads(path.read_text())["format"] == 1
 

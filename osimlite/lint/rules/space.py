@@ -66,8 +66,9 @@ def degenerate_frame(subject: Subject, found: FindingSink) -> None:
             here = subject.target_of(here, "socket_parent")
         # The way ends on itself: what it passed since it was here first is the circle.
         circle = list(way.values())[list(way).index(id(here)) :] if id(here) in way else []
+        consequence = _fate_of_circle(subject, circle) if circle else ""
         for link in circle:
-            found(f"{called(link)} is fixed to {_fate_of_circle(subject, circle)}", link, tag="socket_parent")
+            found(f"{called(link)} is fixed to {consequence}", link, tag="socket_parent")
     laid = list(subject.each(StationDefinedFrame))
     circles = _on_circles(subject, laid)
     for frame in laid:
