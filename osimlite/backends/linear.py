@@ -92,9 +92,25 @@ def linearize(
     if len(xdot) and np.isnan(xdot).all():
         raise SimulationError("the model has no accelerations in this state; a simulation from it says why")
     chosen = _chosen(model.output_names if outputs else {}, outputs)
+    if not (np.isfinite(xdot).all() and np.isfinite(a).all() and np.isfinite(b).all()):
+        raise SimulationError(_odd_entry(model.states, model.controls, xdot, a, b))
     y, c, d = model.observed(time, x, u, chosen) if outputs else (np.zeros((0, size)) for size in (1, len(x), len(u)))
+    if not all(np.isfinite(part).all() for part in (y, c, d)):
+        raise SimulationError("an output of the model or its derivative is no finite number in this state")
     names = tuple(f"{group}:{model.output_names[group][k]}" for group, k in chosen)
     return Linearization(model.states, model.controls, time, x, u, xdot, a, b, names, y.ravel(), c, d)
+
+
+def _odd_entry(states: Sequence[str], controls: Sequence[str], xdot: Array, a: Array, b: Array) -> str:
+    """Return which derivative is NaN or infinite, in words."""
+    columns = [("", xdot.reshape(-1, 1), [""]), (" by ", a, states), (" by ", b, controls)]
+    for words, matrix, names in columns:
+        odd = np.argwhere(~np.isfinite(matrix))
+        if len(odd):
+            row, column = odd[0]
+            place = f"the rate of '{states[row]}'" + (f"{words}'{names[column]}'" if words else "")
+            return f"{place} is {matrix[row, column]:g}; look for a number in the model that is far too large or small"
+    return "a derivative is no finite number"
 
 
 def _chosen(output_names: Mapping[str, Sequence[str]], names: Sequence[str]) -> list[tuple[str, int]]:

@@ -70,7 +70,9 @@ def ik(
     what, names, errors = "marker", motion.markers, motion.marker_errors
     if of_sensors:
         what, names, errors = "orientation", motion.sensors, motion.orientation_errors
-    write_sto(folder / f"{what}_errors.sto", f"{what} errors", motion.times.tolist(), names, errors.tolist())
+    write_sto(
+        folder / f"{what}_errors.sto", f"{what} errors", motion.times.tolist(), names, errors.tolist(), has_missing=True
+    )
     for line in told(motion):
         say(line)
     if words := describe_unknown(model, IGNORED):

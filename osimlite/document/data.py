@@ -233,7 +233,7 @@ class _Reader:
             data = [self._real(word) for word in data] if isinstance(data, list) else self._real(data)
         try:
             return kind.check(data, None)
-        except ValueError as error:
+        except (ValueError, OverflowError) as error:
             raise ModelError(f"{where}: {error}") from None
 
     def _real(self, data: Any) -> Any:
@@ -307,7 +307,8 @@ def parsed_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
         line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
         reason = getattr(error, "problem", None) or "it cannot be read"
         raise DocumentError(f"not YAML: {reason}", file=file, line=line, column=column) from None
-    except (RecursionError, ValueError):
+    # A date of a year beyond 9999, or a number beyond those of Python, raises whatever its constructor does.
+    except (RecursionError, ValueError, ArithmeticError, LookupError, TypeError, AttributeError):
         raise DocumentError("the YAML text cannot be read as a model", file=file, line=1) from None
 
 

@@ -79,8 +79,19 @@ def classes_in(*paths: str | PathLike[str]) -> dict[str, type[Object]]:
 def _declared(files: tuple[tuple[str, int | None], ...]) -> Mapping[str, type[Object]]:
     result: dict[str, type[Object]] = {}
     for path, _ in files:
-        _Declarations(path, result).build()
+        try:
+            _Declarations(path, result).build()
+        except (TypeError, ValueError, ArithmeticError, LookupError, AttributeError, RecursionError) as error:
+            # The file holds data of kinds that no declaration has; those that people mix up have messages of their own.
+            raise OsimliteError(f"its classes cannot be made: {error}", file=path) from None
     return result
+
+
+MAX_LINEAGE = 50
+"""Classes of a file that derive from each other; OpenSim's own have eight."""
+
+MAX_VALUES = 1_000_000
+"""Values of a list for which a declaration asks."""
 
 
 class _Declarations:
@@ -104,7 +115,7 @@ class _Declarations:
         for entry in self.rows(self.top, "references"):
             self.mapping(entry, _OF_A_REFERENCE, "a reference", "references")
             rule = entry.get("resolution")
-            if rule not in RULES:
+            if not isinstance(rule, str) or rule not in RULES:
                 raise self.error(
                     f"there is no resolution '{rule}'{or_known(str(rule), RULES)}", "references", str(rule)
                 )
@@ -125,6 +136,8 @@ class _Declarations:
                 raise self.error(f"there is no class '{name}'{near}", *words)
             if name in MODULES:
                 raise self.error(f"'{name}' is a class of OpenSim itself", name)
+            if len(self.pending) > MAX_LINEAGE:
+                raise self.error(f"more than {MAX_LINEAGE} classes derive from each other", name)
             if name in self.pending:
                 raise self.error(f"{listed(self.pending)} derive from each other, or hold each other", name)
             self.pending.append(name)
@@ -200,7 +213,12 @@ class _Declarations:
             kind = Reference(reference["resolution"], str(reference.get("target")), shape, required, legacy)
             held = str | Component
         else:
-            least, most = int(row.get("min") or 0), row.get("max")
+            least, most = row.get("min") or 0, row.get("max")
+            for key, count in (("min", least), ("max", 0 if most is None else most)):
+                if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count <= MAX_VALUES:
+                    raise self.error(f"'{key}' of '{name}' must be a number of values, not '{count}'", owner, name, key)
+            if not isinstance(row.get("unit") or "", str):
+                raise self.error(f"'unit' of '{name}' must be a text", owner, name, "unit")
             kind = Value(cast("Any", typed), shape, row.get("unit"), "", least, most, legacy)
             held = _SCALARS[typed]
         if shape == "list":

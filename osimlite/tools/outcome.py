@@ -15,6 +15,7 @@ from osimlite.quantity import tell
 from osimlite.records import dataclass, field, replace
 from osimlite.simulation.files.old_storage import PRECISION, printed
 from osimlite.simulation.files.storage import StoTable, adapter_lines
+from osimlite.text import listed
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.named_files import inputs_among
 from osimlite.writing import ResultWriter
@@ -59,11 +60,15 @@ class Outcome:
         """
         if precision > MOST_DIGITS:
             raise SettingError(f"output_precision is {precision}; give the digits behind the point, {PRECISION} or 16")
+        if (missing := self._note_missing(path, table)) and "NaN" not in description:
+            description = f"{description}\n{missing}" if description else f"\n{missing}\n"
         self.tables[path.name] = replace(table, file=str(path))
         self._texts[path] = printed(table, description, max(precision, 0))
 
     def new_table(self, path: Path, table: StoTable) -> None:
         """Have a table written in the newer form of OpenSim's storage files, with its own header."""
+        if (missing := self._note_missing(path, table)) and "NaN" not in "".join(map(str, table.header.values())):
+            table = replace(table, header={**table.header, "missing": missing})
         self.tables[path.name] = replace(table, file=str(path))
         self._texts[path] = adapter_lines(table)
 
@@ -79,6 +84,20 @@ class Outcome:
         """Say something of what came out that makes it doubtful, also on standard error."""
         self.tell(name, words)
         tell(words)
+
+    def _note_missing(self, path: Path, table: StoTable) -> str:
+        """Return what a table says of the values that it lacks, and tell the user; "" if it lacks none.
+
+        No file has NaN as if it were a result: muscles without an equilibrium and markers that were
+        not seen leave it, and both the file and the summary name the columns.
+        """
+        missing = np.isnan(table.rows).any(axis=0) if table.rows.size else np.zeros(0, dtype=bool)
+        if not missing.any():
+            return ""
+        names = listed([f"'{table.columns[place]}'" for place in np.flatnonzero(missing)])
+        if not any("NaN" in words for _, words in self.told):
+            self.tell("not a number", f"{path.name} has NaN where there is no value: {names}")
+        return f"NaN stands where there is no value: {names}"
 
     def _require_numbers(self) -> None:
         """Refuse motions that are no numbers, and infinite numbers. Unseen markers and some muscles have none."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from itertools import count
@@ -63,11 +64,8 @@ def page_text(data: Mapping[str, Any]) -> str:
         "@SCRIPT@": "".join((kernels_text(data["program"]), *map(read, SCRIPTS))),
         "@DATA@": words,
     }
-    text = read("page.html")
-    for name, part in parts.items():
-        before, _, after = text.partition(name)
-        text = before + part + after
-    return text
+    # All at once: a model may be called "@DATA@", and a part that is in place already is no template.
+    return re.sub("|".join(parts), lambda match: parts[match[0]], read("page.html"))
 
 
 @any_numbers

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.multibody.spatial import Array
-from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.files.storage import StoTable, expect_plain_labels
 
 DEGREES = (
     "If the header above contains a line with 'inDegrees', this indicates whether rotational values are in degrees "
@@ -32,6 +32,7 @@ def printed(table: StoTable, description: str = "", precision: int = PRECISION) 
         description: what stands before the end of the header; a line end is added.
         precision: digits behind the point.
     """
+    expect_plain_labels(table.name, table.columns)
     yield f"{table.name}\nversion=1\nnRows={len(table.times)}\nnColumns={len(table.columns) + 1}\n"
     yield f"inDegrees={'yes' if table.in_degrees else 'no'}\n"
     if description:

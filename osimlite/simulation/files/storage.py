@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from osimlite.errors import OsimliteError
+from osimlite.errors import OsimliteError, SimulationError
 from osimlite.files import written_atomically
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass, field
@@ -85,6 +85,7 @@ def write_sto(
     *,
     in_degrees: bool = False,
     kind: str = "double",
+    has_missing: bool = False,
 ) -> None:
     """Write a table to a file, whole or not at all; the rows are taken one by one.
 
@@ -96,15 +97,17 @@ def write_sto(
         rows: numbers, of one value after the other.
         in_degrees: whether rotational values are in degrees.
         kind: of the values: ``Vec3``, ``Quaternion`` and whatever else OpenSim knows.
+        has_missing: whether NaN stands for what was not measured, such as a marker that was not seen.
 
     Raises:
+        SimulationError: a number is NaN or infinite.
         OsimliteError: the file cannot be written.
         UnsupportedError: OpenSim does not know the kind.
     """
     # How many rows there are stands before them.
     with tempfile.TemporaryFile("w+b") as body:
         count = 0
-        for line in _lines(times, rows, len(suffixes(kind))):
+        for line in _lines(times, rows, len(suffixes(kind)), () if has_missing else columns):
             body.write(line.encode())
             count += 1
         body.seek(0)
@@ -140,7 +143,37 @@ def beside(folder: Path, name: str) -> Path:
     return there if there.is_file() or not here.is_file() else here
 
 
+def expect_plain_labels(name: str, columns: Sequence[str]) -> None:
+    """Refuse names that a table cannot hold: a tab ends a label, and a line end the header.
+
+    Raises:
+        OsimliteError: a name has a tab or a line end.
+    """
+    for label in (name, *columns):
+        # Readers of text end lines at more characters than at line feeds.
+        if "\t" in label or len(f"{label}.".splitlines()) > 1:
+            raise OsimliteError(
+                f"a table cannot have the name {label!r}, which holds a tab or a line end; rename it in the model"
+            )
+
+
+def expect_numbers(name: str, columns: Sequence[str], times: Array, rows: Array) -> None:
+    """Refuse a result that is no number: this is the guard of all tables that are no input.
+
+    Raises:
+        SimulationError: a value is NaN or infinite; with its column and time.
+    """
+    odd = np.argwhere(~np.isfinite(rows))
+    if len(odd):
+        row, column = odd[0]
+        raise SimulationError(
+            f"'{columns[column]}' of the {name or 'results'} is {rows[row, column]:g} at {times[row]:g} s; look for a "
+            "number in the model or the data that is far too large"
+        )
+
+
 def _header(name: str, columns: Sequence[str], rows: int, in_degrees: bool, kind: str) -> Iterator[str]:
+    expect_plain_labels(name, columns)
     yield f"{name}\n"
     yield f"inDegrees={'yes' if in_degrees else 'no'}\n"
     yield f"nColumns={len(columns) + 1}\n"
@@ -150,9 +183,14 @@ def _header(name: str, columns: Sequence[str], rows: int, in_degrees: bool, kind
     yield "\t".join(("time", *columns)) + "\n"
 
 
-def _lines(times: Iterable[float], rows: Iterable[Iterable[float]], size: int) -> Iterator[str]:
-    """Lines of numbers, of which `size` make a value."""
+def _lines(
+    times: Iterable[float], rows: Iterable[Iterable[float]], size: int, columns: Sequence[str] = ()
+) -> Iterator[str]:
+    """Yield lines of numbers, of which `size` make a value; those in named columns must be finite."""
     for time, row in zip(times, rows, strict=True):
+        if columns and not np.isfinite(values := np.array([*row], dtype=float)).all():
+            labels = columns if size == 1 else [column for column in columns for _ in range(size)]
+            expect_numbers("results", labels, np.array([time]), values[None])
         words = [word[:-2] if word.endswith(".0") else word for word in map(repr, map(float, row))]
         if size > 1:
             if len(words) % size:
@@ -163,6 +201,7 @@ def _lines(times: Iterable[float], rows: Iterable[Iterable[float]], size: int) -
 
 def adapter_lines(table: StoTable) -> Iterator[str]:
     """The lines of a table as OpenSim's ``STOFileAdapter`` writes it, without the version of OpenSim."""
+    expect_plain_labels("", (*table.columns, *table.header, *map(str, table.header.values())))
     yield "".join(f"{key}={value}\n" for key, value in table.header.items())
     yield f"DataType={table.kind}\nversion=3\nendheader\n"
     ends = suffixes(table.kind)
