@@ -1,0 +1,289 @@
+"""Damage files at random, run a command on each, and look for crashes, hangs and changed files.
+
+One process serves all commands of a kind and is started anew when it dies or hangs, so that thousands of
+commands take minutes. `python -m tests.hostile.mutations 500` prints the table of all kinds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import random
+import select
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+from typing import NamedTuple
+
+import osimlite
+
+ROOT = Path(osimlite.__file__).parents[1]
+FIXTURES = ROOT / "fixtures"
+
+HANG_SECONDS = 10.0
+"""Processor time of a command beyond which it counts as a hang."""
+
+WALL_SECONDS = 240.0
+"""Time by the clock after which a command is ended: other programs may be busy."""
+
+SERVER = """
+import contextlib, io, json, os, resource, sys, time, traceback
+from osimlite.cli import main
+os.chdir(sys.argv[1])
+for line in sys.stdin:
+    order = json.loads(line)
+    begin, out, code = time.process_time(), io.StringIO(), None
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    try:
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
+            main(order)
+    except SystemExit as error:
+        code = error.code
+    except BaseException:
+        code = "traceback: " + traceback.format_exc()[-600:]
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    used = time.process_time() - begin + after.ru_utime - spent.ru_utime
+    text = out.getvalue()
+    if "Traceback" in text:
+        code = "traceback: " + text[-600:]
+    print("ANSWER" + json.dumps([code, used, text[-300:]]), file=sys.__stdout__, flush=True)
+"""
+
+
+class Kind(NamedTuple):
+    """One kind of file: which files are damaged, what lies beside them, and the commands that read them."""
+
+    ending: str
+    sources: tuple[str, ...]  # below the fixtures
+    beside: tuple[str, ...]
+    commands: tuple[tuple[str, ...], ...]  # @ is the damaged file
+
+
+_PENDULUM = ("pipelines/pendulum/model.osim",)
+_SLIDE = ("setups/slide.osim", "setups/slide_guess.sto", "setups/slide_states.sto")
+_IMU = ("pipelines/pendulum/orientations.sto", "pipelines/pendulum/angles.sto")
+_OUT = ("-o", "out")
+
+KINDS = {
+    ".c3d": Kind(
+        ".c3d",
+        ("trials/force_plate.c3d", "trials/two_markers.c3d", "trials/no_plate.c3d"),
+        _PENDULUM,
+        (("ik", "model.osim", "@", *_OUT),),
+    ),
+    ".trc": Kind(
+        ".trc",
+        ("setups/walk.trc",),
+        _PENDULUM,
+        (("validate", "@", "--no-cache"), ("ik", "model.osim", "@", *_OUT)),
+    ),
+    ".mot": Kind(
+        ".mot",
+        ("@angles", "setups/coords.mot"),
+        _PENDULUM,
+        (("validate", "@", "--no-cache"), ("inverse-dynamics", "model.osim", "@", *_OUT)),
+    ),
+    ".xml": Kind(
+        ".xml",
+        ("pipelines/pendulum/imu_placer.xml", "setups/id.xml", "setups/ik.xml", "setups/loads.xml"),
+        (*_PENDULUM, *_IMU),
+        (("validate", "@", "--no-cache"), ("run", "@", *_OUT)),
+    ),
+    ".omoco": Kind(".omoco", ("setups/slide.omoco",), _SLIDE, (("validate", "@", "--no-cache"),)),
+    ".scone": Kind(".scone", ("@walking/human-walks.scone",), _PENDULUM, (("scone", "@", "--to", "0.01", *_OUT),)),
+    ".yaml": Kind(".yaml", ("@yaml",), (), (("build", "@", "-o", "built.osim"),)),
+    ".vtp": Kind(
+        ".vtp",
+        ("meshes",),
+        (*_PENDULUM, "@mesh.osim"),
+        (("validate", "mesh.osim", "--no-cache"), ("view", "mesh.osim", "--html", "page.html")),
+    ),
+}
+
+MESH_MODEL = """<OpenSimDocument Version="40600"><Model name="m"><Ground name="ground"><attached_geometry>
+<Mesh name="g"><mesh_file>it.vtp</mesh_file></Mesh></attached_geometry></Ground></Model></OpenSimDocument>
+"""
+
+TOKENS = (
+    b"<", b">", b"\0", b"\xff", b"nan", b"inf", b"-1", b"1e400", b"9" * 30, b"&", b"\"", b"\t", b"\n", b"{", b"}",
+    b"[", b"]", b"..", b"/", b"<!--", b"<![CDATA[", b": &a *a", b"\xef\xbb\xbf", b"0", b" ",
+)  # fmt: skip
+
+
+def damage(data: bytes, rng: random.Random) -> bytes:
+    """Return a file with one to four random changes: bytes, pieces lost, doubled, moved or replaced by tokens."""
+    result = bytearray(data)
+    for _ in range(rng.randint(1, 4)):
+        size = len(result)
+        # Half of the changes are near the beginning, where headers are.
+        place = rng.randrange(min(size, 600) if rng.random() < 0.5 else size) if size else 0
+        end = min(size, place + rng.choice((1, 2, 8, 64, 512)))
+        match rng.randrange(7):
+            case 0 if size:
+                result[place] = rng.randrange(256)
+            case 1:
+                del result[place:end]
+            case 2:
+                result[place:place] = result[place:end] * rng.choice((1, 3, 50))
+            case 3:
+                result[place:end] = rng.choice(TOKENS)
+            case 4:
+                result[place:place] = rng.choice(TOKENS)
+            case 5 if rng.random() < 0.3:
+                del result[place:]
+            case _:
+                other = rng.randrange(size) if size else 0
+                result[place:place] = result[other : other + 32]
+    return bytes(result)
+
+
+class Server:
+    """A process that runs commands in one folder, and is started anew after a crash or a hang."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._process: subprocess.Popen[str] | None = None
+
+    def run(self, words: list[str]) -> tuple[str, float, str]:
+        """Return how a command ends, its processor time (s) and its last words."""
+        if self._process is None:
+            environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+            environment |= {"XDG_CACHE_HOME": str(self.folder.parent / "cache")}
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-c", SERVER, str(self.folder)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                text=True,
+                env=environment,
+            )
+        process = self._process
+        assert process.stdin is not None and process.stdout is not None
+        process.stdin.write(json.dumps(words) + "\n")
+        process.stdin.flush()
+        deadline = time.monotonic() + WALL_SECONDS
+        while time.monotonic() < deadline:
+            if not select.select([process.stdout], [], [], 1.0)[0]:
+                continue
+            line = process.stdout.readline()
+            if not line:
+                self.close()
+                return f"crash {process.wait()}", 0.0, ""
+            if line.startswith("ANSWER"):
+                code, used, text = json.loads(line[6:])
+                return str(code), used, text
+        self.close()
+        return "hang", WALL_SECONDS, ""
+
+    def close(self) -> None:
+        """End the process."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+
+
+def run_kind(name: str, count: int, seed: int = 1) -> tuple[Counter[str], list[str]]:
+    """Damage files of a kind and run its commands on them.
+
+    Args:
+        name: of the kind, an ending.
+        count: of mutations.
+        seed: the same seed, the same mutations.
+
+    Returns:
+        How often commands ended in each way, and a line for each fault: a traceback, a crash, a hang or a file
+        that was changed.
+    """
+    kind, rng, faults, counts = KINDS[name], random.Random(f"{name} {seed}"), list[str](), Counter[str]()
+    with tempfile.TemporaryDirectory() as top:
+        folder, outside = Path(top, "work", "in"), Path(top, "outside")
+        folder.mkdir(parents=True)
+        outside.mkdir()
+        (outside / "precious.txt").write_text("precious")
+        sources = _sources(kind)
+        for file in kind.beside:
+            if file.startswith("@"):
+                (folder / file[1:]).write_text(MESH_MODEL)
+            else:
+                shutil.copy(FIXTURES / file, folder)
+        server = Server(folder)
+        with contextlib.closing(server):
+            for number in range(count):
+                data = damage(rng.choice(sources), rng)
+                file = folder / f"it{kind.ending}"
+                file.write_bytes(data)
+                before = _digests(Path(top))
+                for command in kind.commands:
+                    code, used, text = server.run([file.name if word == "@" else word for word in command])
+                    is_good = code in ("0", "1", "2") and used <= HANG_SECONDS
+                    counts[code if is_good else "fault"] += 1
+                    if not is_good:
+                        faults.append(f"{name} {number} {command[0]}: {code} {used:.1f} s {text}")
+                        _keep(file, number)
+                after = _digests(Path(top))
+                if changed := [path for path, digest in before.items() if after.get(path) != digest]:
+                    faults.append(f"{name} {number}: changed {changed}")
+                for path in set(after) - set(before):
+                    if not path.startswith(("work/in/out", "work/in/built.osim", "work/in/page.html", "cache")):
+                        faults.append(f"{name} {number}: wrote {path}")
+                    if not path.startswith("cache"):
+                        Path(top, path).unlink()
+    return counts, faults
+
+
+def _sources(kind: Kind) -> list[bytes]:
+    result = []
+    for source in kind.sources:
+        if source == "@angles":
+            rows = "".join(f"{0.1 * k:.1f}\t{0.01 * k * k:.4f}\t0.1\n" for k in range(12))
+            head = "motion\nversion=1\nnRows=12\nnColumns=3\ninDegrees=no\nendheader\ntime\tq0\tq1\n"
+            result.append((head + rows).encode())
+        elif source == "@yaml":
+            from osimlite.document.data import to_yaml
+
+            result.append(to_yaml(osimlite.read(FIXTURES / _PENDULUM[0])).encode())
+        elif source.startswith("@"):
+            text = (ROOT / "osimlite" / "models" / source[1:]).read_bytes()
+            result.append(text.replace(b"human.osim", b"model.osim"))
+        elif (FIXTURES / source).is_dir():
+            result += [path.read_bytes() for path in sorted((FIXTURES / source).rglob(f"*{kind.ending}"))]
+        else:
+            result.append((FIXTURES / source).read_bytes())
+    return result
+
+
+def _digests(top: Path) -> dict[str, str]:
+    files = (path for path in top.rglob("*") if path.is_file() and "cache" not in path.relative_to(top).parts)
+    return {path.relative_to(top).as_posix(): hashlib.md5(path.read_bytes()).hexdigest() for path in files}
+
+
+def _keep(file: Path, number: int) -> None:
+    """Keep a file with a fault where the user has asked for it."""
+    if folder := os.environ.get("OSIMLITE_KEEP_MUTATIONS"):
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        shutil.copy(file, Path(folder, f"{number}{file.suffix}"))
+
+
+def main() -> None:
+    """Print the table of all kinds, or of those that are named."""
+    count, names = int(sys.argv[1]), sys.argv[2:] or list(KINDS)
+    for name in names:
+        begin = time.monotonic()
+        counts, faults = run_kind(name, count)
+        ends = ", ".join(f"{counts[code]} x {code}" for code in sorted(counts))
+        sys.stdout.write(
+            f"{name:8} {count} mutations: {ends}; {len(faults)} faults ({time.monotonic() - begin:.0f} s)\n"
+        )
+        sys.stdout.write("".join(f"    {fault}\n" for fault in faults[:20]))
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,28 @@
+"""Random damage to files of all kinds: no traceback, no crash, no hang, and no file that nobody asked for."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from tests.hostile.mutations import KINDS, run_kind
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="limits of processes are those of POSIX")
+NEEDS = {".c3d": "ezc3d", ".scone": "numpy", ".yaml": "yaml", ".omoco": "casadi"}
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_few_mutations(name: str) -> None:
+    pytest.importorskip(NEEDS.get(name, "numpy"), reason="needs a package that reads such files")
+    counts, faults = run_kind(name, 6, seed=2)
+    assert counts.total() >= 6 and not faults, "\n".join(faults)
+
+
+@pytest.mark.full
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("name", KINDS)
+def test_five_hundred_mutations(name: str) -> None:
+    pytest.importorskip(NEEDS.get(name, "numpy"), reason="needs a package that reads such files")
+    counts, faults = run_kind(name, 500)
+    assert counts.total() >= 500 and not faults, "\n".join(faults)
