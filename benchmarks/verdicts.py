@@ -112,7 +112,7 @@ def read_models(shared: Path, folder: Path) -> list[Path]:
 
     result = []
     for source in sorted((shared / "corpus" / "models").glob("*/*.osim")):
-        if source.stat().st_size > LARGEST_BYTES:
+        if source.stat().st_size > LARGEST_BYTES or b"<Model" not in source.read_bytes():
             continue
         home = folder / source.parent.name
         shutil.copytree(source.parent, home)
