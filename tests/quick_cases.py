@@ -28,7 +28,7 @@ QUICK_CASES: dict[str, tuple[str, ...]] = {
     ),
     "tests/oracle/test_joint_reaction.py::test_forces_of_constraints": ("couplers",),
     "tests/oracle/test_lab_pipelines.py::test_a_motion_off_the_constraints_is_tracked": ("rra.xml",),
-    "tests/oracle/test_lab_pipelines.py::test_closed_loops_are_tracked": ("a rod and a coupler",),
+    "tests/oracle/test_lab_pipelines.py::test_closed_loops_are_tracked": ("as it is",),
     "tests/oracle/test_moco.py::test_loads": ("explicit",),
     "tests/oracle/test_moco.py::test_states_that_are_moved_onto_constraints": ("trapezoidal-explicit",),
     "tests/optimal/check_studies.py::test_exact_hessian_finds_it_too": ("pendulum-50",),
