@@ -269,7 +269,7 @@ class ResultWriter:
         if self.overwrite or not os.path.lexists(path):
             return
         there, kind = read_at_most(path, BEGINNING), kind_of(beginning)
-        if there and (kind is None or kind_of(there) != kind):
+        if there and not _are_alike(kind_of(there), kind):
             raise WriteRefusedError(
                 f"a result would replace this file, which is not {kind or 'such a text'}; move it, "
                 "let the document name another file, or replace it with --overwrite",
@@ -318,6 +318,18 @@ def project_folder(document: str | Path) -> str:
         return marked
     around = folder.parent
     return str(folder if str(around) in shared else around)
+
+
+UNNAMED_TABLE = "a table 'UNKNOWN' of OpenSim"
+"""The kind of a table to which OpenSim gave no name, as RRA and CMC do with their states."""
+
+
+def _are_alike(present: str | None, new: str | None) -> bool:
+    """Return whether a result of one kind may take the place of a text of another."""
+    if present is None or new is None:
+        return False
+    is_table = present == UNNAMED_TABLE and new.startswith("a table '")
+    return present == new or is_table
 
 
 def kind_of(beginning: bytes) -> str | None:

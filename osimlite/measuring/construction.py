@@ -7,6 +7,7 @@ pose that fulfils the constraints, one evaluation of the accelerations.
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterator
 from math import isfinite
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.errors import OsimliteError, SimulationError, UnsupportedError
+from osimlite.errors import DoubtfulWarning, OsimliteError, SimulationError, UnsupportedError
 from osimlite.kernels.layout import OUTCOME, STAGE
 from osimlite.lint.construction import Obstacle, Stage
 from osimlite.multibody import build_mechanism
@@ -44,7 +45,10 @@ def try_construction(model: Model, folder: Path | None = None) -> list[Obstacle]
         model: the model to build.
         folder: where its file is, and the files that it names; None for a model that is in no file.
     """
-    return [*_Construction(model, folder).run()]
+    with warnings.catch_warnings():
+        # Rules report what a simulation only warns of.
+        warnings.simplefilter("ignore", DoubtfulWarning)
+        return [*_Construction(model, folder).run()]
 
 
 class _Construction:

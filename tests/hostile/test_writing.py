@@ -334,3 +334,14 @@ def test_names_of_results_without_a_tool(tmp_path: Path) -> None:
 def contents(folder: Path) -> dict[Path, bytes]:
     """Return all files below a folder."""
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_table_without_a_name_is_a_result(tmp_path: Path) -> None:
+    """OpenSim calls the states of RRA and CMC 'UNKNOWN'."""
+    writer = ResultWriter.for_document(tmp_path / "setup.xml", tmp_path)
+    path = tmp_path / "it_states.sto"
+    path.write_text(RESULT.replace(RESULT.partition("\n")[0], "UNKNOWN"))
+    writer.expect_replaceable(path, RESULT.encode())
+    path.write_text(RESULT.replace(RESULT.partition("\n")[0], "Coordinates"))
+    with pytest.raises(WriteRefusedError):
+        writer.expect_replaceable(path, RESULT.encode())

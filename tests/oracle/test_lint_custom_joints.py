@@ -85,6 +85,9 @@ CASES = {
     "in one plane": document("a", ONE, (X, Y, "1 1 0", X, Y, Z)),
 }
 
+# OpenSim computes something, without a message, that depends on what is in memory or is no function of both variables.
+SILENT = ("one coefficient", "no second variable, elsewhere", "second variable of a spline, elsewhere")
+
 
 def fails(path: Path) -> bool:
     """Whether OpenSim refuses or crashes, or has NaN for an acceleration; asked in a process of its own."""
@@ -111,4 +114,4 @@ def test_there_is_an_error_where_opensim_fails(case, tmp_path):
     path = tmp_path / "joint.osim"
     path.write_text(CASES[case])
     report = validate(path)
-    assert bool(report.errors) == fails(path), str(report)
+    assert bool(report.errors) == (case in SILENT or fails(path)), str(report)

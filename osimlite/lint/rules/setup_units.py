@@ -165,7 +165,8 @@ def ground_twice(setup: Setup, found: FindingSink) -> None:
     if setup.tree is None:
         return
     for tool in setup.having("external_loads_file"):
-        if getattr(tool, "replace_force_set", False):
+        # A goal that tracks measured contact forces compares the loads and does not apply them.
+        if getattr(tool, "replace_force_set", False) or is_a(tool, "MocoGoal"):
             continue
         loads: Any = setup.document(tool.external_loads_file)
         if loads is None or not is_a(loads, "ExternalLoads"):
