@@ -253,8 +253,8 @@ def _mentions(module: str, word: str) -> bool:
 def _text_of(module: str) -> str | None:
     spec = find_spec(module)
     loader = None if spec is None else spec.loader
-    text: str | None = loader.get_source(module) if hasattr(loader, "get_source") else None
-    return text
+    read_source: Callable[[str], str | None] | None = getattr(loader, "get_source", None)
+    return read_source(module) if read_source is not None else None
 
 
 @by_tags

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from tests.labs import LABS, change, copy_lab
 MARKERS = ("ASI", "PSI", "SAC", "THI", "KNE", "TIB", "ANK", "TOE")
 
 
-def fit(model: Path, markers: tuple[str, ...], **options: object):
+def fit(model: Path, markers: tuple[str, ...], **options: Any):
     """Fit the walk of a lab to some of its markers."""
     data = MarkerData.of(LABS / "unseen" / "walk.trc")
     arrays = {name: data.positions[:, place] for place, name in enumerate(data.names) if name in markers}

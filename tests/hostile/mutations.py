@@ -208,11 +208,11 @@ def run_kind(name: str, count: int, seed: int = 1) -> tuple[Counter[str], list[s
         outside.mkdir()
         (outside / "precious.txt").write_text("precious")
         sources = _sources(kind)
-        for file in kind.beside:
-            if file.startswith("@"):
-                (folder / file[1:]).write_text(MESH_MODEL)
+        for beside in kind.beside:
+            if beside.startswith("@"):
+                (folder / beside[1:]).write_text(MESH_MODEL)
             else:
-                shutil.copy(FIXTURES / file, folder)
+                shutil.copy(FIXTURES / beside, folder)
         server = Server(folder)
         with contextlib.closing(server):
             for number in range(count):

@@ -171,9 +171,9 @@ UNSEEN = {"in some frames": None, "in all frames": "ANK", "another in all": "KNE
 def test_marker_errors_where_a_marker_is_unseen(tmp_path: Path, which: str) -> None:
     """Sums and largest errors are of the markers that are seen, means of all."""
     folder = copy_lab("unseen", tmp_path)
-    if UNSEEN[which]:
+    if marker := UNSEEN[which]:
         lines = (folder / "walk.trc").read_text().splitlines()
-        place = 2 + 3 * [word for word in lines[3].split("\t")[2:] if word].index(UNSEEN[which])
+        place = 2 + 3 * [word for word in lines[3].split("\t")[2:] if word].index(marker)
         for number, line in enumerate(lines[5:], 5):
             cells = line.split("\t")
             if len(cells) > place:
