@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -104,6 +105,12 @@ class Asked:
                 for word in value if isinstance(value, tuple) else (value,):
                     if spec.name in part.model_fields_set and (fault := _fault(spec, word)):
                         raise self.wrong(part, f"{spec.tag} is {word!r}{fault}")
+                if (
+                    spec.name in ("bounds", "initial_bounds", "final_bounds")
+                    and len(value)
+                    and (value[0] == math.inf or value[-1] == -math.inf)
+                ):
+                    raise self.wrong(part, f"{spec.name} leave no finite value")
                 if (
                     spec.name in ("bounds", "initial_bounds", "final_bounds")
                     and len(value) == 2

@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import random
+import re
 import select
 import shutil
 import subprocess
@@ -28,6 +29,11 @@ FIXTURES = ROOT / "fixtures"
 
 HANG_SECONDS = 10.0
 """Processor time of a command beyond which it counts as a hang."""
+
+SEARCH_SECONDS = 60.0
+"""The same of the search for the solution of a study, which has a limit of iterations of its own."""
+
+TERMINATED = "crash -15"
 
 WALL_SECONDS = 240.0
 """Time by the clock after which a command is ended: other programs may be busy."""
@@ -79,7 +85,7 @@ KINDS = {
     ),
     ".trc": Kind(
         ".trc",
-        ("setups/walk.trc",),
+        ("@trc", "setups/walk.trc"),
         _PENDULUM,
         (("validate", "@", "--no-cache"), ("ik", "model.osim", "@", *_OUT)),
     ),
@@ -91,12 +97,17 @@ KINDS = {
     ),
     ".xml": Kind(
         ".xml",
-        ("pipelines/pendulum/imu_placer.xml", "setups/id.xml", "setups/ik.xml", "setups/loads.xml"),
-        (*_PENDULUM, *_IMU),
+        ("@id", "pipelines/pendulum/imu_placer.xml", "setups/ik.xml", "setups/loads.xml"),
+        (*_PENDULUM, *_IMU, "@motion.sto"),
         (("validate", "@", "--no-cache"), ("run", "@", *_OUT)),
     ),
-    ".omoco": Kind(".omoco", ("setups/slide.omoco",), _SLIDE, (("validate", "@", "--no-cache"),)),
-    ".scone": Kind(".scone", ("@walking/human-walks.scone",), _PENDULUM, (("scone", "@", "--to", "0.01", *_OUT),)),
+    ".omoco": Kind(".omoco", ("setups/slide.omoco",), _SLIDE, (("validate", "@", "--no-cache"), ("run", "@", *_OUT))),
+    ".scone": Kind(
+        ".scone",
+        ("@scone",),
+        ("@human.osim", "@human-walks.zml", "@human-walks.par"),
+        (("scone", "@", "--to", "0.05", *_OUT),),
+    ),
     ".yaml": Kind(".yaml", ("@yaml",), (), (("build", "@", "-o", "built.osim"),)),
     ".vtp": Kind(
         ".vtp",
@@ -106,6 +117,20 @@ KINDS = {
     ),
 }
 
+ANGLES = "motion\nversion=1\nnRows=12\nnColumns=3\ninDegrees=no\nendheader\ntime\tq0\tq1\n" + "".join(
+    f"{0.1 * k:.1f}\t{0.01 * k * k:.4f}\t0.1\n" for k in range(12)
+)
+SETUP = """<OpenSimDocument Version="40600"><InverseDynamicsTool name="swing">
+<results_directory>out</results_directory><model_file>model.osim</model_file>
+<time_range>0 1</time_range><coordinates_file>motion.sto</coordinates_file>
+<output_gen_force_file>forces.sto</output_gen_force_file>
+</InverseDynamicsTool></OpenSimDocument>
+"""
+MARKERS = (
+    "PathFileType\t4\t(X/Y/Z)\tit.trc\n"
+    "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n"
+    "100\t100\t5\t2\tm\t100\t1\t5\nFrame#\tTime\tm0\t\t\tm1\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n"
+) + "".join(f"{k + 1}\t{0.01 * k:.2f}\t0.1\t-0.5\t0\t0.2\t-{1.0 + 0.01 * k:.2f}\t0\n" for k in range(5))
 MESH_MODEL = """<OpenSimDocument Version="40600"><Model name="m"><Ground name="ground"><attached_geometry>
 <Mesh name="g"><mesh_file>it.vtp</mesh_file></Mesh></attached_geometry></Ground></Model></OpenSimDocument>
 """
@@ -116,14 +141,28 @@ TOKENS = (
 )  # fmt: skip
 
 
+VALUES = (
+    b"0", b"-1", b"1e308", b"-1e308", b"1e-320", b"nan", b"inf", b"-inf", b"9" * 30, b"1e9", b"2147483648", b"", b"x",
+    b"0 0", b"true", b"../..", b"/", b"a b", b"1.5", b"0.001", b"1e6",
+)  # fmt: skip
+"""What is put in the place of numbers and names."""
+
+_WORD = re.compile(rb"(?<=>)[^<>\s][^<>]*(?=<)|(?<=[\s=:{\[,~\"])[-+]?[0-9][0-9.e+-]*|(?<== )[\w./*]+")
+
+
 def damage(data: bytes, rng: random.Random) -> bytes:
     """Return a file with one to four random changes: bytes, pieces lost, doubled, moved or replaced by tokens."""
     result = bytearray(data)
-    for _ in range(rng.randint(1, 4)):
+    for _ in range(rng.choice((1, 1, 1, 2, 4))):
         size = len(result)
         # Half of the changes are near the beginning, where headers are.
         place = rng.randrange(min(size, 600) if rng.random() < 0.5 else size) if size else 0
-        end = min(size, place + rng.choice((1, 2, 8, 64, 512)))
+        if rng.random() < 0.5 and (spans := [*_WORD.finditer(result)]):
+            # Another number or name in the place of one: the file stays well-formed.
+            start, stop = rng.choice(spans).span()
+            result[start:stop] = rng.choice((*VALUES, rng.choice(spans)[0]))
+            continue
+        end = min(size, place + rng.choice((1, 1, 2, 4, 8, 64, 512)))
         match rng.randrange(7):
             case 0 if size:
                 result[place] = rng.randrange(256)
@@ -210,7 +249,7 @@ def run_kind(name: str, count: int, seed: int = 1) -> tuple[Counter[str], list[s
         sources = _sources(kind)
         for beside in kind.beside:
             if beside.startswith("@"):
-                (folder / beside[1:]).write_text(MESH_MODEL)
+                (folder / beside[1:]).write_bytes(_made(beside[1:]))
             else:
                 shutil.copy(FIXTURES / beside, folder)
         server = Server(folder)
@@ -222,7 +261,12 @@ def run_kind(name: str, count: int, seed: int = 1) -> tuple[Counter[str], list[s
                 before = _digests(Path(top))
                 for command in kind.commands:
                     code, used, text = server.run([file.name if word == "@" else word for word in command])
-                    is_good = code in ("0", "1", "2") and used <= HANG_SECONDS
+                    if code == TERMINATED:
+                        # Nothing here sends that signal: somebody else has ended the process. It is asked again.
+                        code, used, text = server.run([file.name if word == "@" else word for word in command])
+                    # A study is searched as long as it says, which no damage to it makes endless.
+                    limit = SEARCH_SECONDS if name == ".omoco" and command[0] == "run" else HANG_SECONDS
+                    is_good = code in ("0", "1", "2") and used <= limit
                     counts[code if is_good else "fault"] += 1
                     if not is_good:
                         faults.append(f"{name} {number} {command[0]}: {code} {used:.1f} s {text}")
@@ -241,22 +285,38 @@ def run_kind(name: str, count: int, seed: int = 1) -> tuple[Counter[str], list[s
 def _sources(kind: Kind) -> list[bytes]:
     result = []
     for source in kind.sources:
-        if source == "@angles":
-            rows = "".join(f"{0.1 * k:.1f}\t{0.01 * k * k:.4f}\t0.1\n" for k in range(12))
-            head = "motion\nversion=1\nnRows=12\nnColumns=3\ninDegrees=no\nendheader\ntime\tq0\tq1\n"
-            result.append((head + rows).encode())
-        elif source == "@yaml":
-            from osimlite.document.data import to_yaml
-
-            result.append(to_yaml(osimlite.read(FIXTURES / _PENDULUM[0])).encode())
-        elif source.startswith("@"):
-            text = (ROOT / "osimlite" / "models" / source[1:]).read_bytes()
-            result.append(text.replace(b"human.osim", b"model.osim"))
+        if source.startswith("@"):
+            result.append(_made(source[1:]))
         elif (FIXTURES / source).is_dir():
             result += [path.read_bytes() for path in sorted((FIXTURES / source).rglob(f"*{kind.ending}"))]
         else:
             result.append((FIXTURES / source).read_bytes())
     return result
+
+
+def _made(name: str) -> bytes:
+    """Return the content of a file that is not among the fixtures."""
+    from osimlite.document.data import to_yaml
+    from osimlite.models.walking import human
+
+    walking = ROOT / "osimlite" / "models" / "walking"
+    match name:
+        case "angles" | "motion.sto":
+            return ANGLES.encode()
+        case "trc":
+            return MARKERS.encode()
+        case "id":
+            return SETUP.encode()
+        case "mesh.osim":
+            return MESH_MODEL.encode()
+        case "yaml":
+            return to_yaml(osimlite.read(FIXTURES / _PENDULUM[0])).encode()
+        case "human.osim":
+            return osimlite.to_text(human()).encode()
+        case "scone":
+            return (walking / "human-walks.scone").read_bytes()
+        case _:
+            return (walking / name).read_bytes()
 
 
 def _digests(top: Path) -> dict[str, str]:
