@@ -70,7 +70,9 @@ class MuscleForces(StoTable):
         ends = ("activation.sto", "force.sto", "controls.xml")
         paths = [folder / f"StaticOptimization_{end}" for end in ends]
         for path, table in zip(paths, (self, self.forces), strict=False):
-            write_sto(path, table.name, table.times, table.columns, table.rows.tolist())
+            # NaN stands for the times without a solution, which the caller reports.
+            has_missing = not self.solved.all()
+            write_sto(path, table.name, table.times, table.columns, table.rows.tolist(), has_missing=has_missing)
         with written_atomically(paths[-1]) as stream:
             stream.writelines(line.encode() for line in control_set(self))
         return paths

@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 
 from osimlite.cli import ALIASES, COMMANDS
+from osimlite.errors import MissingDependency
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted(
@@ -144,7 +145,11 @@ def test_a_page_names_what_exists(page: str) -> None:
             for words in split_commands(code):
                 check_command(words)
         elif ">>>" not in code and not re.search(r"^\s*\.\.\.$", code, re.M):
-            check_python(code, names)
+            try:
+                check_python(code, names)
+            except MissingDependency as missing:
+                # CasADi cannot be loaded where another test of this process has loaded OpenSim.
+                pytest.skip(str(missing))
 
 
 @pytest.mark.parametrize(

@@ -175,7 +175,7 @@ def test_orientations_are_fitted_and_translations_stay(lab: Path) -> None:
     assert list(result.to_frame().columns) == list(result.coordinates)
     path = lab / "trial.sto"
     rows = np.stack([*sensors.values()], axis=1).reshape(8, -1).tolist()
-    write_sto(path, "trial", (np.arange(8) / 10).tolist(), list(sensors), rows, kind="Quaternion")
+    write_sto(path, "trial", (np.arange(8) / 10).tolist(), list(sensors), rows, kind="Quaternion", has_missing=True)
     again = osimlite.inverse_kinematics(model, orientations=path, start=0.2, end=0.4)
     assert again.times == pytest.approx([0.2, 0.3, 0.4])
     assert again.values == pytest.approx(result.values[2:5], abs=1e-7)

@@ -224,7 +224,9 @@ class Server:
         """End the process."""
         if self._process is not None:
             self._process.kill()
-            self._process.wait()
+            # Leaving the context closes the pipes and waits.
+            with self._process:
+                pass
             self._process = None
 
 

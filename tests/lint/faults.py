@@ -210,7 +210,7 @@ VALUES = [
     Fault("vec3_two", value("location", "0 -0.2175", FOOT), "OSIM202"),
     Fault("vec3_four", value("location", "0 -0.2175 0 5", FOOT), "OSIM202"),
     Fault("vec3_comma", value("location", "0,-0.2175,0", FOOT), "OSIM201"),
-    Fault("vec3_empty", value("location", "", FOOT), "OSIM204"),
+    Fault("vec3_empty", value("location", "", FOOT), "OSIM204", severity="warning"),
     Fault("vec3_text", value("location", "0 abc 0", FOOT), "OSIM201"),
     Fault("inertia_three", value("inertia", "2 2 2"), "OSIM202"),
     Fault("inertia_seven", value("inertia", "2 2 2 0 0 0 9"), "OSIM202"),
