@@ -239,7 +239,8 @@ class ResultWriter:
             )
         if self.overwrite:
             return real
-        if real.is_symlink():
+        # os.path.islink is false, without an error, where a name is too long; writing then says so.
+        if os.path.islink(real):
             raise WriteRefusedError(
                 "the document names a link as a result, and results are not written through links; "
                 "remove it, or replace it with --overwrite",
