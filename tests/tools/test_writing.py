@@ -118,12 +118,11 @@ def test_names_that_are_too_long_are_told(trial: Path, place: str) -> None:
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_nothing_is_computed_from_what_an_earlier_run_has_left(trial: Path, workers: int) -> None:
-    """With -o a motion goes elsewhere, and there is an old one where the forces are computed from."""
+    """With -o the motion goes elsewhere, and the forces are computed from it, not from the old one."""
     done = run("run", "id.xml", "z_ik.xml", "-o", "new", "--workers", workers, "--json", folder=trial)
-    result = {item["setup"]: item for item in json.loads(done.out)}
-    assert done.code == 2 and result["z_ik.xml"]["status"] == "done" and result["id.xml"]["status"] == "not run"
-    assert result["id.xml"]["message"] == "it needs what z_ik.xml makes, and -o puts that elsewhere; leave out -o"
-    assert not (trial / "new" / "id").exists() and (trial / "new" / "z_ik" / "ik.mot").is_file()
+    result = {item["setup"]: item["status"] for item in json.loads(done.out)}
+    assert (done.code, result) == (0, {"z_ik.xml": "done", "id.xml": "done"})
+    assert (trial / "new" / "id").is_dir() and (trial / "new" / "z_ik" / "ik.mot").is_file()
 
 
 @pytest.mark.parametrize(("precision", "time"), [(-3, "       0"), (0, "       0"), (12, "      0.200000000000")])
@@ -143,5 +142,6 @@ def test_more_digits_than_there_are(trial: Path) -> None:
 
 def test_markers_without_weights_are_not_told_to_be_unseen(trial: Path) -> None:
     """The weight of a task of OpenSim's is 0 unless it is given."""
-    told = dict(osimlite.run(trial / "scale.xml").told)
-    assert told["markers"] == "1 frame in which nothing with a weight was seen: the pose stays as it was before"
+    told = osimlite.run(trial / "scale.xml").told
+    words = "1 frame in which nothing with a weight was seen: the pose stays as it was before"
+    assert ("markers", words) in [tuple(fact) for fact in told]
