@@ -33,6 +33,8 @@ GCC = (
     # With g++'s own limits on inlining an evaluation takes 1.4 to 1.6 times as long.
     "--param=max-inline-insns-single=1000", "--param=max-inline-insns-auto=300",
     "--param=inline-unit-growth=300", "--param=large-function-growth=1000",
+    # Vectors of a difference beside a sum (c x - s y, s x + c y) are fused by g++ 12 in spite of -ffp-contract=off.
+    "-fno-tree-slp-vectorize",
 )  # fmt: skip
 
 CLANG = (

@@ -23,7 +23,7 @@ from tests.conftest import ROOT
 
 pytestmark = [pytest.mark.full, pytest.mark.timeout(3600)]
 
-STRICT = "-fno-fast-math", "-fno-math-errno", "-fno-trapping-math", "-w"
+STRICT = "-fno-fast-math", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-slp-vectorize", "-w"
 CALLS = 100
 """Calls of each function of numbers."""
 
