@@ -1,7 +1,7 @@
-"""The one way to open a file for reading: regular files only, never a pipe, a socket or a device.
+"""Opening of files for reading: regular files only, never a pipe, a socket or a device.
 
-Every module of the package opens files through :func:`open_file` or through what is built on it,
-:func:`osimlite.files.read_file`; a test enforces it. A pipe may never begin and a device may never
+A file that a user or a document names is opened through :func:`open_file` or through what is built
+on it, :func:`osimlite.files.read_file`. A pipe may never begin and a device may never
 end, so that a name in a stranger's document could stop the program or fill the memory.
 """
 
