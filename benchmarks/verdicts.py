@@ -155,7 +155,7 @@ def edit_models(texts: dict[Path, str], singles: int, pairs: int, draw: random.R
 
 
 def combine_faults(path: Path, count: int, draw: random.Random) -> Iterator[Trial]:
-    """Yield the walker with two of its measured faults: all pairs, or so many of them at random."""
+    """Yield the walker with two of its measured faults: all pairs, or `count` random ones."""
     from tests.lint.faults import FAULTS
 
     text = path.read_text(encoding="utf-8")

@@ -27,7 +27,7 @@ def open_file(path: str | Path) -> BinaryIO:
     try:
         # Opening a device may already do something; and what was there may be another thing a moment later.
         _expect_ordinary(os.stat(path).st_mode, path)
-        return open(path, "rb", opener=_without_waiting)
+        return open(path, "rb", opener=_open_nonblocking)
     except (OSError, ValueError) as error:
         if isinstance(error, FileNotFoundError):
             raise no_such(path) from None
@@ -57,8 +57,8 @@ def read_at_most(path: str | Path, limit: int) -> bytes:
             raise MissingFileError(f"cannot read the file: {error.strerror}", file=str(path)) from None
 
 
-def _without_waiting(path: str, flags: int) -> int:
-    """Open a file; one that has become a pipe meanwhile is not waited for, and refused."""
+def _open_nonblocking(path: str, flags: int) -> int:
+    """Open a file, and refuse it without waiting if it has become a pipe since it was checked."""
     handle = os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
     try:
         _expect_ordinary(os.fstat(handle).st_mode, path)

@@ -63,10 +63,10 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
         OsimliteError: the folder is missing or cannot be written to; nothing has changed then.
     """
     with written_atomically(path) as stream:
-        stream.write(_encoded(content, path) if isinstance(content, str) else content)
+        stream.write(_encode(content, path) if isinstance(content, str) else content)
 
 
-def _encoded(content: str, path: str | Path) -> bytes:
+def _encode(content: str, path: str | Path) -> bytes:
     try:
         return content.encode()
     except UnicodeEncodeError as error:
@@ -90,11 +90,11 @@ def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
     # Unlike those of Path, these functions take a name that is too long for a file.
     exists = os.path.exists(target)
     if exists and not target.is_file():
-        with _opened(target) as stream:
+        with _open_special(target) as stream:
             yield stream
         return
     _expect_link_inside(path, target)
-    with _staged(target, target.stat() if exists else None) as stream:
+    with _stage(target, target.stat() if exists else None) as stream:
         yield stream
 
 
@@ -111,7 +111,7 @@ def written_into(folder: str | Path, name: str) -> Iterator[BinaryIO]:
     target = Path(os.path.realpath(folder)) / name
     _expect_regular_or_none(target)
     there = target.lstat() if os.path.isfile(target) and not target.is_symlink() else None
-    with _staged(target, there, in_place=False) as stream:
+    with _stage(target, there, in_place=False) as stream:
         yield stream
 
 
@@ -123,7 +123,7 @@ def write_into(folder: str | Path, name: str, content: str | bytes) -> Path:
     """
     path = Path(folder) / name
     with written_into(folder, name) as stream:
-        stream.write(_encoded(content, path) if isinstance(content, str) else content)
+        stream.write(_encode(content, path) if isinstance(content, str) else content)
     return path
 
 
@@ -294,14 +294,14 @@ class ResultWriter:
         first = b""
         # The parts of a table may be its lines, and its head says what it is.
         for part in parts:
-            first += _encoded(part, real)
+            first += _encode(part, real)
             if len(first) >= BEGINNING:
                 break
         self.expect_replaceable(real, first)
         make_folder(real.parent)
         with written_into(real.parent, real.name) as stream:
             stream.write(first)
-            stream.writelines(_encoded(part, real) for part in parts)
+            stream.writelines(_encode(part, real) for part in parts)
             stream.close()
             yield stream
 
@@ -314,8 +314,8 @@ def project_folder(document: str | Path) -> str:
     (`../results`). It is never the home folder, the temporary folder or what is above one of them.
     """
     folder = Path(os.path.realpath(document)).parent
-    shared = shared_folders()
-    if (marked := _marked_folder(folder, shared)) is not None:
+    shared = find_shared_folders()
+    if (marked := _find_marked_folder(folder, shared)) is not None:
         return marked
     around = folder.parent
     return str(folder if str(around) in shared else around)
@@ -368,7 +368,7 @@ def _lineage(folder: str | Path) -> tuple[Path, ...]:
     return (path, *path.parents)
 
 
-def shared_folders() -> set[str]:
+def find_shared_folders() -> set[str]:
     """Return the folders that hold more than one project: home, the temporary one, and those above."""
     import tempfile
 
@@ -376,7 +376,7 @@ def shared_folders() -> set[str]:
     return {str(part) for place in places for part in _lineage(os.path.realpath(place))}
 
 
-def _marked_folder(folder: Path, shared: set[str]) -> str | None:
+def _find_marked_folder(folder: Path, shared: set[str]) -> str | None:
     """Return the nearest folder above that is marked as the top of a project."""
     for place in _lineage(folder):
         if str(place) in shared:
@@ -396,7 +396,7 @@ def _expect_link_inside(path: str | Path, target: Path) -> None:
     if not os.path.islink(path) or os.path.abspath(path).startswith(("/dev/", "/proc/")):
         return
     folder = Path(os.path.realpath(os.path.dirname(os.path.abspath(path))))
-    if not _is_inside(target, [_marked_folder(folder, shared_folders()) or folder]):
+    if not _is_inside(target, [_find_marked_folder(folder, find_shared_folders()) or folder]):
         raise WriteRefusedError(
             f"this is a link to '{target}', out of its project, and is not followed; name that file itself",
             file=str(path),
@@ -416,8 +416,8 @@ def _expect_regular_or_none(path: Path, *, links: bool = True) -> None:
 
 
 @contextmanager
-def _staged(target: Path, there: os.stat_result | None, *, in_place: bool = True) -> Iterator[BinaryIO]:
-    """Yield a stream to a file beside its place, which it takes when the context ends.
+def _stage(target: Path, there: os.stat_result | None, *, in_place: bool = True) -> Iterator[BinaryIO]:
+    """Yield a stream to a temporary file that replaces the target when the context ends.
 
     Args:
         target: the place.
@@ -441,11 +441,11 @@ def _staged(target: Path, there: os.stat_result | None, *, in_place: bool = True
             yield stream
         if there is None:
             Path(name).chmod(0o666 & ~_umask())
-        is_alike = there is None or _made_like(name, target, there)
+        is_alike = there is None or _copy_attributes(name, target, there)
         if not is_alike and not in_place and there is not None:
             os.chmod(name, stat.S_IMODE(there.st_mode))
             is_alike = True
-        replaces = is_alike and _replaced(name, target)
+        replaces = is_alike and _replace_file(name, target)
     except OSError as error:
         Path(name).unlink(missing_ok=True)
         raise OsimliteError(f"cannot write the file: {error.strerror}", file=str(target)) from None
@@ -457,12 +457,12 @@ def _staged(target: Path, there: os.stat_result | None, *, in_place: bool = True
 
 
 def put_in_place(path: Path, target: Path) -> None:
-    """Let a finished file take the place of another.
+    """Replace a file by a finished one.
 
     Raises:
         OSError, OsimliteError: it cannot.
     """
-    if not _replaced(path, target):
+    if not _replace_file(path, target):
         _copy_into(path, target)
 
 
@@ -486,7 +486,7 @@ def make_folder(path: str | Path) -> Path:
 
 @contextmanager
 def folder_to_fill(path: str | Path) -> Iterator[Path]:
-    """A folder for what takes a while to find, made before the work begins; gone again if that fails without a file.
+    """Make a folder before long work begins, and remove it if the work fails without a file.
 
     Raises:
         OsimliteError: it cannot be made or written to; the message says why.
@@ -505,8 +505,8 @@ def folder_to_fill(path: str | Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _opened(target: Path) -> Iterator[BinaryIO]:
-    """Yield a stream into a pipe or a device; a pipe that nobody reads is an error, not a reason to wait."""
+def _open_special(target: Path) -> Iterator[BinaryIO]:
+    """Yield a stream into a pipe or a device, without waiting for a reader of the pipe."""
     if target.is_dir():
         raise OsimliteError("cannot write the file: this is a folder; name a file in it", file=str(target))
     try:
@@ -519,8 +519,8 @@ def _opened(target: Path) -> Iterator[BinaryIO]:
         raise OsimliteError(f"cannot write the file: {reason}", file=str(target)) from None
 
 
-def _made_like(name: str, target: Path, there: os.stat_result) -> bool:
-    """Give a file what a system notes of another that it is to replace; whether all of it could be given."""
+def _copy_attributes(name: str, target: Path, there: os.stat_result) -> bool:
+    """Copy owner, mode and extended attributes to a new file; return whether all could be copied."""
     if there.st_nlink > 1:
         return False
     try:
@@ -536,8 +536,8 @@ def _made_like(name: str, target: Path, there: os.stat_result) -> bool:
     return True
 
 
-def _replaced(name: str | Path, target: Path) -> bool:
-    """Put a file in the place of another; False if that stays, as on Windows while a program has it open."""
+def _replace_file(name: str | Path, target: Path) -> bool:
+    """Replace a file; return False if the old one stays, as on Windows while a program has it open."""
     try:
         os.replace(name, target)
     except PermissionError:

@@ -33,7 +33,7 @@ class KernelLibraryHook(BuildHookInterface):  # type: ignore[misc]
     PLUGIN_NAME = "custom"
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Prepare what the build adds.
+        """Compile the kernel library and add it to the build.
 
         Args:
             version: "editable" or "standard".

@@ -48,7 +48,7 @@ UNUSED = ("lxml", "lxml.etree", "numpy", "numpy.typing", "rich", "rapidfuzz", "s
 
 
 class StandIn(types.ModuleType):
-    """A module in the place of one that is not installed; every name in it is another stand-in."""
+    """Substitute for a module that is not installed; every attribute is another substitute."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -198,7 +198,7 @@ def table_text(texts: Path, compiler: toolchain.Compiler, target: str) -> str:
 
 
 def replace_file(source: Path, target: Path) -> None:
-    """Put a file in the place of another, which a process may have loaded."""
+    """Replace a file that a process may have loaded."""
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=target.name)
     os.close(handle)
     shutil.copyfile(source, name)

@@ -111,7 +111,7 @@ RESERVED = frozenset((
 """Names that a kernel may have and JavaScript or the runtime not."""
 
 
-def as_javascript(laws: Sequence[Function], others: Sequence[Function] = ()) -> str:
+def write_javascript(laws: Sequence[Function], others: Sequence[Function] = ()) -> str:
     """Return kernels, and all that they call, as the text of one expression: an object that has them.
 
     Args:

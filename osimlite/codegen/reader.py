@@ -55,7 +55,7 @@ class Kernel:
 
     @property
     def name(self) -> str:
-        """Of the function among those of all modules."""
+        """Name of the function that is unique among all modules."""
         return name_of(self.function)
 
     def value(self, node: ast.expr) -> Any:
@@ -152,11 +152,11 @@ LONGEST_QUOTE = 100
 
 
 def name_of(function: Function) -> str:
-    """Of a function among those of all modules."""
+    """Return a name of a function that is unique among all modules."""
     return f"{function.__module__.rpartition('.')[2]}_{function.__name__}"
 
 
 def stored(*trees: ast.AST) -> list[str]:
-    """Names of the variables that some code sets, each once."""
+    """Return the names of the variables that some code assigns, each once."""
     nodes = (node for tree in trees for node in ast.walk(tree))
     return list(dict.fromkeys(n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)))

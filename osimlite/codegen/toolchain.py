@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import shlex
-import shutil
-import subprocess
 import sys
 from collections.abc import Sequence
 from functools import cache
@@ -15,17 +13,23 @@ from typing import NamedTuple
 from osimlite.codegen.processor import machine_name
 from osimlite.errors import OsimliteError
 
+# `shutil` and `subprocess` are imported where a compiler runs: simulations need only the names of targets.
+
 PROGRAMS = ("clang++", "g++", "c++", "clang-cl")
 """Compilers in the order of preference: clang compiles kernels faster than g++."""
 
-BASELINE, X86_64_V3, NATIVE = "baseline", "x86-64-v3", "native"
-"""Targets: any processor of this kind, x86-64 processors with AVX2, this very processor."""
+BASELINE = "baseline"
+"""Target: any processor of this architecture."""
+X86_64_V3 = "x86-64-v3"
+"""Target: x86-64 processors with AVX2 and FMA."""
+NATIVE = "native"
+"""Target: the processor that compiles."""
 
 COMMON = (
     "-std=c++17", "-fPIC", "-fvisibility=hidden", "-fno-exceptions", "-fno-rtti", "-w",
     # Results are those of Python to the last bit: no fused operations, no rearranged sums.
     "-fno-fast-math", "-ffp-contract=off",
-    # Nobody reads errno or the floating-point exceptions; both would keep loops from being vectorised.
+    # Kernels read neither errno nor the floating-point exceptions, and both prevent vectorised loops.
     "-fno-math-errno", "-fno-trapping-math",
 )  # fmt: skip
 
@@ -38,8 +42,8 @@ GCC = (
 )  # fmt: skip
 
 CLANG = (
-    # Clang inlines less what several kernels call: with its own limit an evaluation of gait2392 takes 16.1 instead of
-    # 13.9 us. Compiling takes a tenth longer.
+    # Clang inlines functions with several callers less. With its default limit an evaluation of gait2392 takes 16.1
+    # instead of 13.9 us; compiling takes a tenth longer with this one.
     "-mllvm", "-inline-threshold=500",
 )  # fmt: skip
 
@@ -115,13 +119,15 @@ class Compiler(NamedTuple):
             is_gnu = self.is_gcc or "ziglang" in self.command
             flags += ["-Wl,--no-insert-timestamp"] if is_gnu else ["-Wl,/Brepro"]
         if not self.is_gcc and (self.system != "win32" or "ziglang" in self.command):
-            # Nothing of the library of C++ is used, which zig would compile first.
+            # Kernels use no C++ standard library, and zig would compile one first.
             flags.append("-nostdlib++")
         folder = objects[0].parent
         names = [os.path.relpath(item, folder) for item in objects]
         self._run([*flags, *names, "-o", str(result.resolve())], folder)
 
     def _run(self, arguments: Sequence[str], folder: Path) -> None:
+        import subprocess
+
         command = [*self.command, *arguments]
         try:
             done = subprocess.run(command, cwd=folder, capture_output=True, check=False)
@@ -138,6 +144,8 @@ class Compiler(NamedTuple):
 @cache
 def find_compiler() -> Compiler | None:
     """Return the C++ compiler of this machine: that of the variable CXX, else one of the path; None without one."""
+    import shutil
+
     chosen = os.environ.get("CXX")
     if chosen:
         return _examine(tuple(shlex.split(chosen, posix=os.name != "nt")))
@@ -174,7 +182,9 @@ def library_suffix(system: str = sys.platform) -> str:
 
 
 def _examine(command: tuple[str, ...]) -> Compiler | None:
-    """Return a compiler by its command; None if it does not run, or is none of those that are known."""
+    """Return the compiler that a command starts, or None if it does not run or is unknown."""
+    import subprocess
+
     try:
         done = subprocess.run([*command, "--version"], capture_output=True, check=False)
     except OSError:
@@ -188,6 +198,8 @@ def _examine(command: tuple[str, ...]) -> Compiler | None:
 
 def _has_developer_tools() -> bool:
     """Return whether macOS has its compiler; without it, `clang++` is a program that asks to install it."""
+    import subprocess
+
     try:
         done = subprocess.run(["xcode-select", "-p"], capture_output=True, check=False)
     except OSError:

@@ -24,7 +24,7 @@ def find_unknown(model: Model) -> list[str]:
 
 
 def describe_unknown(model: Model, consequence: str) -> str:
-    """Return a sentence on the parts of a model whose classes are unknown; "" if there are none.
+    """Return a sentence that names the components of unknown classes, or "" without such components.
 
     Args:
         model: that was read.

@@ -30,23 +30,45 @@ from osimlite.kernels.states import copy, is_finite
 
 # Integers: the head, then what each degree of freedom is, three arrays (n,), room for a list (n,) of those that are
 # free, and of each coupler the degree of freedom that depends on others and its equation.
-MOVES_LINKS, COUPLERS, ASSEMBLY_HEAD = 0, 1, 2
-"""Whether the equations need the links in their places (1) or the coordinates alone (0); the count of the couplers."""
-HELD, COUNTED, CLAMPED, FREE, COUPLER_AT = 0, 1, 2, 3, 4
-"""The arrays behind the head: FREED, HELD_BY_USER or HELD_AT_END; whether changes count; whether there is a range."""
-FREED, HELD_BY_USER, HELD_AT_END = 0, 1, 2
+MOVES_LINKS = 0
+"""Offset of 1 if the equations need positions of links, 0 if they need coordinates only."""
+COUPLERS = 1
+"""Offset of the number of couplers."""
+ASSEMBLY_HEAD = 2
+"""Length of the head."""
+HELD = 0
+"""Array of FREED, HELD_BY_USER or HELD_AT_END."""
+COUNTED = 1
+"""Array of 1 where a change of the coordinate adds to the cost, else 0."""
+CLAMPED = 2
+"""Array of 1 where the coordinate has a range, else 0."""
+FREE = 3
+"""Workspace for the list of free degrees of freedom."""
+COUPLER_AT = 4
+"""Records of the couplers."""
+FREED = 0
+"""State of a degree of freedom that the search moves."""
+HELD_BY_USER = 1
+"""State of a degree of freedom that the caller fixed, such as a locked coordinate."""
+HELD_AT_END = 2
+"""State of a degree of freedom that the search fixed at an end of its range."""
 
 # Numbers: the tolerance of the equations, and the range of each degree of freedom.
-TOLERANCE, RANGES = 0, 1
+TOLERANCE = 0
+"""Offset of the tolerance of the equations (m or rad)."""
+RANGES = 1
+"""Offset of the ranges (n, 2) in m or rad."""
 
-ASSEMBLED, APART = 0.0, 1.0
-"""What becomes of a pose: assembled; no pose near it fulfils the constraints."""
+ASSEMBLED = 0.0
+"""Status of a pose that fulfils the constraints."""
+APART = 1.0
+"""Status of a pose near which no pose fulfils the constraints."""
 
 MAX_STEPS = 100
 EASE = 100.0
-"""How much more readily coordinates move whose changes do not count."""
+"""Factor by which coordinates that do not count move more easily."""
 LONGEST_STEP = 0.5
-"""Of a coordinate towards the constraints (m or rad)."""
+"""Largest change of a coordinate in one step towards the constraints (m or rad)."""
 OUTSIDE = 1e-12
 """How far a coordinate may be outside of its range (m or rad)."""
 EXACT = 1e-15
@@ -59,8 +81,10 @@ FAST = 0.1
 """Steps that shrink by less than this factor need the curvature of the constraints."""
 DIFFERENCE = 1e-6
 """Length of the finite differences of the equations (m or rad)."""
-FLAT, SAFE = 1e-7, 1e-6
-"""Curvatures below FLAT move nothing that counts; with pivots above SAFE no curvature is below."""
+FLAT = 1e-7
+"""Curvature of the cost below which a direction counts as undetermined."""
+SAFE = 1e-6
+"""Least pivot of Cholesky's method above which no curvature is below `FLAT`."""
 
 
 class Assembly(NamedTuple):
@@ -76,8 +100,8 @@ class Assembly(NamedTuple):
     w: Floats
 
 
-def assembly_room(count: int, size: int) -> int:
-    """Return the length of the work vector for so many equations and degrees of freedom."""
+def assembly_work_size(count: int, size: int) -> int:
+    """Return the length of the work vector for `count` equations and `size` degrees of freedom."""
     return 7 * size + 3 * count + 2 * count * size + factor_room(count, size) + count * count + 5 * size * size
 
 
@@ -85,7 +109,7 @@ def assemble_poses(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, p: Ints, c: Floats, w: Floats, frames: Floats,
     found: Floats, count: int,
 ) -> int:  # fmt: skip
-    """Assemble some poses, each by itself.
+    """Assemble poses, each independently of the others.
 
     Args:
         model: the mechanism, all of whose coordinates are degrees of freedom.
@@ -95,7 +119,7 @@ def assemble_poses(
         f: room for its rates.
         p: the integers of the assembly.
         c: its numbers.
-        w: its work, see `assembly_room`.
+        w: its work, see `assembly_work_size`.
         frames: of each pose the time (s) and the values of all degrees of freedom (n,).
         found: of each pose the values that fulfil the constraints (n,), and ASSEMBLED or APART.
         count: of the poses.
@@ -129,7 +153,7 @@ def assemble_pose(a: Assembly, wanted: Floats, q: Floats) -> bool:
                     worst, most = k, outside
         if worst < 0:
             return True
-        # Whichever would leave its range furthest stays at the end of it; then the others may fit.
+        # Fix the coordinate that leaves its range furthest at the end of it; then the others may fit.
         held[worst] = HELD_AT_END
         given[worst] = min(max(q[worst], ranges[2 * worst]), ranges[2 * worst + 1])
 

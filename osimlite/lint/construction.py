@@ -164,6 +164,6 @@ def _try_construction(subject: Subject) -> list[Obstacle]:
         try:
             result: list[Obstacle] = try_construction(subject.model, subject.folder)
         except (ArithmeticError, ValueError, OsimliteError) as error:
-            # Numbers beyond what can be computed with, of which other rules report.
+            # Other rules report numbers that are too large to compute with.
             result = [Obstacle(Stage.MECHANISM, "", str(getattr(error, "message", error)))]
     return result

@@ -209,7 +209,7 @@ class _Construction:
     def find_culprits(self, mechanism: Mechanism, forces: Forces, q: Array, u: Array) -> Iterator[Obstacle]:
         """Yield the forces that alone make accelerations that are no numbers."""
         if not _is_computed(mechanism, Forces(()), q, u):
-            # The mechanism itself has numbers that are none, of which other rules report.
+            # Other rules report NaN among the numbers of the mechanism.
             return
         for element in forces.elements:
             alone = Forces((element,), controls=forces.controls)
@@ -263,7 +263,7 @@ def _is_computed(mechanism: Mechanism, forces: Forces, q: Array, u: Array) -> bo
 
 
 def _evaluate(system: System, state: list[float]) -> int | None:
-    """Return the status of an evaluation of the accelerations; None if a number had no value.
+    """Evaluate the accelerations and return the status, or None if a result is not finite.
 
     Kernels that run as Python raise where machine code computes a number that is none.
     """

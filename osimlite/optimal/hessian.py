@@ -45,7 +45,9 @@ class Hessian:
         parts = [(rows, columns), (inner, outer), *((pair[0], pair[1]) for pair in near)]
         keys = np.concatenate([c.astype(np.int64) * width + r for r, c in parts])
         unique, inverse = np.unique(keys, return_inverse=True)
-        self._map = SparseMatrix.of_entries(inverse, np.arange(len(keys)), np.ones(len(keys)), (len(unique), len(keys)))
+        self._map = SparseMatrix.from_entries(
+            inverse, np.arange(len(keys)), np.ones(len(keys)), (len(unique), len(keys))
+        )
         self.sparsity = casadi.Sparsity.triplet(width, width, (unique % width).tolist(), (unique // width).tolist())
 
     def numbers(self, w: Array, factor: float, multipliers: Array) -> Array:

@@ -347,7 +347,7 @@ class Program:
             found: list[Any] = [
                 np.concatenate([np.ravel(part[k]) for part in parts]) if parts else [] for k in range(3)
             ]
-            return SparseMatrix.of_entries(found[0], found[1], found[2], (size, width))
+            return SparseMatrix.from_entries(found[0], found[1], found[2], (size, width))
 
         self._a, self._b = matrix(a, len(layout.lower)), matrix(b, int(self._offsets[-1]))
         self.times = np.concatenate(times)
@@ -374,7 +374,7 @@ class Program:
         )
         unique, inverse = np.unique(keys, return_inverse=True)
         count = len(spread.rows)
-        self._jacobian_map = SparseMatrix.of_entries(
+        self._jacobian_map = SparseMatrix.from_entries(
             inverse[:count], spread.columns, spread.values, (len(unique), len(rows))
         )
         self._jacobian_constant = np.bincount(inverse[count:], weights=own.values, minlength=len(unique))

@@ -23,7 +23,9 @@ class SparseMatrix:
     shape: tuple[int, int]
 
     @classmethod
-    def of_entries(cls, rows: ArrayLike, columns: ArrayLike, values: ArrayLike, shape: tuple[int, int]) -> SparseMatrix:
+    def from_entries(
+        cls, rows: ArrayLike, columns: ArrayLike, values: ArrayLike, shape: tuple[int, int]
+    ) -> SparseMatrix:
         """Return the matrix of some entries; those at one place are added.
 
         Args:
@@ -57,4 +59,4 @@ class SparseMatrix:
         first = np.repeat(starts[:-1][places] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
         chosen = order[first + np.arange(counts.sum())]
         columns = np.repeat(np.arange(len(places)), counts)
-        return SparseMatrix.of_entries(self.rows[chosen], columns, self.values[chosen], (self.shape[0], len(places)))
+        return SparseMatrix.from_entries(self.rows[chosen], columns, self.values[chosen], (self.shape[0], len(places)))

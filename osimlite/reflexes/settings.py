@@ -21,7 +21,7 @@ from osimlite.files import read_file
 from osimlite.multibody.spatial import Array
 from osimlite.records import dataclass, field
 from osimlite.text import did_you_mean, listed
-from osimlite.writing import shared_folders
+from osimlite.writing import find_shared_folders
 
 _TOKEN = re.compile(r'\s+|#[^\n]*|(?P<token>"[^"]*"|<<|>>|[{}=\[\]]|[^\s{}=\[\]#"]+)')
 FLAGS = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
@@ -394,7 +394,7 @@ def _included_file(name: str, path: Path, base: Path) -> Path:
         message = f"'{name}' is not included: the name of the file must end in {endings}"
         raise DocumentError(message, file=str(path))
     top = base.resolve()
-    shared = shared_folders()
+    shared = find_shared_folders()
     for folder in top.parents[:3]:
         if str(folder) in shared:
             break

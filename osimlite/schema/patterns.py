@@ -146,12 +146,12 @@ class _Compiler:
             begin = self.index
             start, end = self._atom()
             while self._peek() in ("*", "+", "?", "{") and self._peek():
-                start, end = self._repeated(begin, start, end)
+                start, end = self._repeat_part(begin, start, end)
             self._link(last, start)
             last = end
         return first, last
 
-    def _repeated(self, begin: int, start: int, end: int) -> tuple[int, int]:
+    def _repeat_part(self, begin: int, start: int, end: int) -> tuple[int, int]:
         """Return a part as often as the quantifier that comes next says.
 
         Args:
@@ -167,7 +167,7 @@ class _Compiler:
         copies = least if most is None else most
         pieces = [(start, end)]
         for _ in range(max(copies, 1) - 1):
-            pieces.append(self._compiled_again(begin, part_end))
+            pieces.append(self._recompile(begin, part_end))
         self.index = after
         skips: list[int] = []
         for number, (piece_start, piece_end) in enumerate(pieces):
@@ -189,11 +189,11 @@ class _Compiler:
             self._link(skip, finish)
         return first, finish
 
-    def _compiled_again(self, begin: int, end: int) -> tuple[int, int]:
+    def _recompile(self, begin: int, end: int) -> tuple[int, int]:
         self.index = begin
         start, last = self._atom()
         while self.index < end:
-            start, last = self._repeated(begin, start, last)
+            start, last = self._repeat_part(begin, start, last)
         return start, last
 
     def _quantifier(self) -> tuple[int, int | None]:
@@ -253,10 +253,10 @@ class _Compiler:
         return part
 
     def _escape(self) -> CharacterTest:
-        characters, is_negated = self._escaped_set()
+        characters, is_negated = self._read_escaped_set()
         return _test(characters, is_negated)
 
-    def _escaped_set(self) -> tuple[frozenset[str], bool]:
+    def _read_escaped_set(self) -> tuple[frozenset[str], bool]:
         """Return the characters that an escape stands for, and whether it stands for all others."""
         letter = self._take()
         if letter.lower() in _ESCAPED_CLASSES:
@@ -285,7 +285,7 @@ class _Compiler:
             high = self._bracket_item(tests)
             if high is None or high < low:
                 raise PatternError(f"the range from '{low}' ends nowhere")
-            tests.append(_between(low, high))
+            tests.append(_make_range_test(low, high))
         return lambda each: any(test(each) for test in tests) != is_negated
 
     def _bracket_item(self, tests: list[CharacterTest]) -> str | None:
@@ -303,7 +303,7 @@ class _Compiler:
             return character
         if self._takes("b"):
             return "\b"
-        characters, is_negated = self._escaped_set()
+        characters, is_negated = self._read_escaped_set()
         if len(characters) == 1 and not is_negated:
             return next(iter(characters))
         tests.append(_test(characters, is_negated))
@@ -314,5 +314,6 @@ def _test(characters: frozenset[str], is_negated: bool) -> CharacterTest:
     return (lambda each: each not in characters) if is_negated else characters.__contains__
 
 
-def _between(low: str, high: str) -> CharacterTest:
+def _make_range_test(low: str, high: str) -> CharacterTest:
+    """Return a test for characters from `low` to `high`, both included."""
     return lambda each: low <= each <= high

@@ -58,7 +58,7 @@ def assemble_motion(mechanism: Mechanism, times: Array, values: Array, code: Cod
         np.zeros(2 * size),
         np.array(_integers(mechanism, order), dtype=np.int64),
         np.array(_numbers(mechanism, order)),
-        np.zeros(assembly.assembly_room(equations, size)),
+        np.zeros(assembly.assembly_work_size(equations, size)),
         np.ascontiguousarray(frames),
         found,
         len(times),

@@ -53,7 +53,7 @@ def build_showable(model: Model) -> ShowableModel:
 
 
 def _take_out(model: Model, message: str) -> str | None:
-    """Remove the first member of a set that a message names, and return its path; None if there is none."""
+    """Remove the first member of a set that a message names; return its path, or None if none is named."""
     tree = model.tree()
     for path in _QUOTED_PATH.findall(message):
         # '/jointset/hip/hip_offset' is part of the joint '/jointset/hip', which is of no use without it.
@@ -76,7 +76,7 @@ def _remove(model: Model, component: Component) -> bool:
 
 
 def describe_errors(findings: Iterable[Finding], parts: Sequence[tuple[str, str]]) -> list[str]:
-    """Return a sentence for each error of a model that concerns none of the parts that are not shown.
+    """Return one sentence per error of the model, without errors of the omitted components.
 
     Args:
         findings: of the validator.

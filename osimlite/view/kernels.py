@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.codegen.javascript import as_javascript
+from osimlite.codegen.javascript import write_javascript
 from osimlite.kernels.constrained_dynamics import bind
 from osimlite.kernels.dynamics import clear_wrenches, generalized_forces
 from osimlite.kernels.layout import CONSTRAINED, ITEM, LINK_WORK, MODEL
@@ -66,7 +66,7 @@ def kernels_text(program: Mapping[str, Any]) -> str:
     """What the page computes with."""
     laws = [law_function(name) for name in program["laws"]]
     others = [place, *(FOR_ARMS if program["items"] else ()), *(FOR_SPEEDS if program["bound"] else ())]
-    kernels = as_javascript(laws, others)
+    kernels = write_javascript(laws, others)
     return f"window.osimlite = {{ kernels: {kernels} }};\n"
 
 

@@ -9,7 +9,7 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from osimlite.codegen.javascript import as_javascript
+from osimlite.codegen.javascript import write_javascript
 from osimlite.codegen.reader import TranslationError
 from osimlite.kernels.paths import pull_path
 from osimlite.kernels.pointers import at
@@ -75,14 +75,14 @@ def page(chromium):
 
 
 def test_functions_give_the_same(page):
-    code = as_javascript([branches], [loops, spread])
+    code = write_javascript([branches], [loops, spread])
     cases = [[a, b] for a in (-1.5, 0.5, 2.0, 12.0) for b in (0.5, 1.0, 7.0, 9.25)]
     result = page.evaluate(f"{json.dumps(cases)}.map(([a, b]) => ({code}).laws[1](a, b))")
     assert result == [branches(a, b) for a, b in cases]
     cases = [[count, start] for count in (0, 1, 3, 9) for start in (0.0, -2.5, 40.0)]
     result = page.evaluate(f"{json.dumps(cases)}.map(([a, b]) => ({code}).loops(a, b))")
     assert result == [loops(count, start) for count, start in cases]
-    code = as_javascript([], [pointers])
+    code = write_javascript([], [pointers])
     result = page.evaluate(f"[1, 2, 4].map((k) => ({code}).pointers(new Float64Array([0, 1, 2, 3, 4, 5]), k))")
     assert result == [pointers(np.arange(6.0), k) for k in (1, 2, 4)]
 
@@ -111,7 +111,7 @@ def shares(a: int) -> int:
 @pytest.mark.parametrize("function", (opens, asks, masks, shares), ids=lambda function: function.__name__)
 def test_what_is_not_known_is_an_error(function):
     with pytest.raises(TranslationError, match=f"'test_javascript_{function.__name__}'.* JavaScript") as caught:
-        as_javascript([], [function])
+        write_javascript([], [function])
     assert caught.value.file == __file__
 
 
@@ -121,7 +121,7 @@ def test_all_kernels_are_translated_but_those_with_random_numbers():
     translated = []
     for name in kernels:
         try:
-            translated.append((name, as_javascript([law_function(name)], [pull_path])))
+            translated.append((name, write_javascript([law_function(name)], [pull_path])))
         except TranslationError as error:
             assert "the function 'reflexes_" in str(error) and "64 bits" in str(error), name
     assert {*kernels} - {name for name, _ in translated} == {"run_by_reflexes", "walk_several"}
@@ -136,7 +136,7 @@ def results():
         pytest.skip("needs Node.js on the PATH")
     tested = [*constructs.EXACT, constructs.compute_series]
     calls = [(function.__name__, *given) for function in tested for given in constructs.INPUTS]
-    found = iter(call_javascript(as_javascript([], tested), calls))
+    found = iter(call_javascript(write_javascript([], tested), calls))
     return {function.__name__: [next(found) for _ in constructs.INPUTS] for function in tested}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from osimlite.codegen.cplusplus import write_library
-from osimlite.codegen.javascript import as_javascript
+from osimlite.codegen.javascript import write_javascript
 from tests.codegen.compiled import are_same_bits, call_library, call_python, compile_text, needs_compiler
 from tests.codegen.node import call_javascript, needs_node
 from tests.codegen.random_functions import make_function, make_inputs
@@ -51,7 +51,7 @@ def test_cplusplus_gives_the_same_bits(cases, tmp_path):
 @needs_node
 def test_javascript_gives_the_same_numbers(cases):
     calls = [(function.__name__, *given) for function, results in cases.items() for given, _ in results]
-    results = iter(call_javascript(as_javascript([], [*cases]), calls))
+    results = iter(call_javascript(write_javascript([], [*cases]), calls))
     for function, rows in cases.items():
         for given, expected in rows:
             assert are_same_bits(ignore_sign_of_zero(next(results)), ignore_sign_of_zero(expected)), (

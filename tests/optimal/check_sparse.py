@@ -15,7 +15,7 @@ def test_products(count: int, shape: tuple[int, int]) -> None:
     values = rng.normal(size=count)
     full = np.zeros(shape)
     np.add.at(full, (rows, columns), values)
-    matrix = SparseMatrix.of_entries(rows, columns, values, shape)
+    matrix = SparseMatrix.from_entries(rows, columns, values, shape)
     x, y = rng.normal(size=shape[1]), rng.normal(size=shape[0])
     assert matrix @ x == pytest.approx(full @ x, abs=1e-13)
     assert matrix.multiply_transpose(y) == pytest.approx(full.T @ y, abs=1e-13)

@@ -26,7 +26,7 @@ from osimlite.codegen.cplusplus.types import (
 )
 
 PRIMARY, UNARY, PRODUCT, SUM, SHIFT, ORDER, EQUALITY, BIT_AND, BIT_XOR, BIT_OR, AND, OR, CHOICE = range(13, 0, -1)
-"""Precedences of C++, those that bind most closely first."""
+"""Precedences of C++ operators: a higher number binds more closely."""
 
 OPERATORS: dict[type[ast.operator], tuple[str, int]] = {
     ast.Mult: ("*", PRODUCT),
@@ -44,7 +44,7 @@ FUNCTIONS: dict[type[ast.operator], str] = {
     ast.Pow: "power",
     ast.LShift: "shift_left",
 }
-"""Operators that mean something else in C++, or nothing, by the function of the header."""
+"""Functions of the header for operators that differ in C++ or do not exist there."""
 COMPARISONS: dict[type[ast.cmpop], tuple[str, int]] = {
     ast.Lt: ("<", ORDER),
     ast.LtE: ("<=", ORDER),
@@ -177,7 +177,7 @@ class ExpressionWriter:
         for index, node in enumerate(nodes):
             text = write(node)
             if is_hazard and index in active[:-1]:
-                kind = self.function.known_type(node.value if isinstance(node, ast.Starred) else node)
+                kind = self.function.require_type(node.value if isinstance(node, ast.Starred) else node)
                 text = self.hold(kind, text)
             texts.append(text)
         return texts
@@ -227,12 +227,12 @@ class ExpressionWriter:
             want: the type.
             least: the lowest precedence that needs no parentheses.
         """
-        have = self.function.known_type(node)
+        have = self.function.require_type(node)
         if have is not want and isinstance(want, Tuple):
             if isinstance(node, ast.Tuple) and not any(isinstance(part, ast.Starred) for part in node.elts):
                 wanted = dict(zip(node.elts, want.parts, strict=True))
                 texts = self.ordered(node.elts, lambda part: self.text_as(part, wanted[part]))
-                kinds = [self.function.known_type(part) if is_number(own) else own for part, own in wanted.items()]
+                kinds = [self.function.require_type(part) if is_number(own) else own for part, own in wanted.items()]
                 return self.build(want, texts, kinds)
             if isinstance(node, ast.IfExp):
                 code = self.choose(node, want)
@@ -253,7 +253,7 @@ class ExpressionWriter:
                 code = self.condition(operand)
                 return Code(f"!{code.text}" if code.precedence == PRIMARY else f"!({code.text})", UNARY)
         code = self.code(node)
-        if self.function.known_type(node) is BOOLEAN:
+        if self.function.require_type(node) is BOOLEAN:
             return code
         text = code.text if code.precedence > EQUALITY else f"({code.text})"
         return Code(f"{text} != 0", EQUALITY)
@@ -276,7 +276,7 @@ class ExpressionWriter:
             case ast.Attribute(value=owner, attr=name):
                 if (value := self.function.value(node)) is not None:
                     return self.constant(ast.unparse(node).replace(".", "_"), value)
-                kind = self.function.known_type(owner)
+                kind = self.function.require_type(owner)
                 assert isinstance(kind, Tuple)
                 return Code(self.item(self.text(owner, PRIMARY), kind, kind.record._fields.index(name)))
             case ast.Tuple():
@@ -290,13 +290,13 @@ class ExpressionWriter:
                 return Code(f"{sign}{self.text(operand, PRIMARY)}", UNARY)
             case ast.BinOp(left=left, op=op, right=right):
                 texts = self.ordered([left, right], lambda part: self._operand(part, op, part is right))
-                return self.operation(texts, op, [self.function.known_type(part) for part in (left, right)], node)
+                return self.operation(texts, op, [self.function.require_type(part) for part in (left, right)], node)
             case ast.BoolOp():
                 return self.either(node)
             case ast.Compare():
                 return self.compare(node)
             case ast.IfExp():
-                return self.choose(node, self.function.known_type(node))
+                return self.choose(node, self.function.require_type(node))
             case ast.Call(func=function, args=arguments):
                 return self.call(node, self.function.called(function), arguments)
         raise self.function.refuse(node)
@@ -316,14 +316,14 @@ class ExpressionWriter:
 
     def new_tuple(self, node: ast.Tuple) -> Code:
         """Return the text of a new tuple."""
-        kind = self.function.known_type(node)
+        kind = self.function.require_type(node)
         assert isinstance(kind, Tuple)
         texts, kinds = self.arguments(node.elts)
         return Code(self.build(kind, texts, kinds))
 
     def subscript(self, owner: ast.expr, index: ast.expr) -> Code:
         """Return the text of an item of a vector or a tuple."""
-        kind = self.function.known_type(owner)
+        kind = self.function.require_type(owner)
         if isinstance(kind, Pointer):
             texts = self.ordered([owner, index], lambda part: self.text(part, PRIMARY if part is owner else CHOICE))
             return Code(f"{texts[0]}[{texts[1]}]")
@@ -379,14 +379,14 @@ class ExpressionWriter:
 
     def either(self, node: ast.BoolOp) -> Code:
         """Return the text of `and` or `or`; of numbers it is the one that decides."""
-        kind = self.function.known_type(node)
+        kind = self.function.require_type(node)
         if kind is BOOLEAN:
             return self.condition(node)
         return Code(self._decide(node.op, node.values, kind))
 
     def _decide(self, op: ast.boolop, values: Sequence[ast.expr], kind: Type) -> str:
         first, *others = values
-        have = self.function.known_type(first)
+        have = self.function.require_type(first)
         if not others:
             return self.cast(self.text(first), have, kind)
         name = self.text(first) if isinstance(first, ast.Name) else self.hold(have, self.text(first))
@@ -407,7 +407,7 @@ class ExpressionWriter:
             before = operands[len(texts) - 1]
             if not is_simple(before):
                 # It is compared twice and evaluated once.
-                texts[-1] = self.hold(self.function.known_type(before), texts[-1])
+                texts[-1] = self.hold(self.function.require_type(before), texts[-1])
             texts.append(self.guarded(self._comparand, operand))
         signs = [COMPARISONS[type(op)][0] for op in node.ops]
         parts = [f"{a} {sign} {b}" for a, sign, b in zip(texts[:-1], signs, texts[1:], strict=True)]
@@ -423,7 +423,7 @@ class ExpressionWriter:
             raise self.function.refuse(node)
         text = self._comparand(node.left)
         if not is_simple(node.left):
-            text = self.hold(self.function.known_type(node.left), text)
+            text = self.hold(self.function.require_type(node.left), text)
         tests = [f"{text} == {self.guarded(self._comparand, item)}" for item in node.comparators[0].elts]
         inner = f"({' || '.join(tests) or 'false'})"
         return Code(inner) if isinstance(node.ops[0], ast.In) else Code(f"!{inner}", UNARY)
@@ -441,43 +441,47 @@ class ExpressionWriter:
         return Code(f"{question} ? {first} : {second}", CHOICE)
 
     def _chosen(self, node: ast.expr, kind: Type) -> str:
-        have = self.function.known_type(node)
+        have = self.function.require_type(node)
         if have is not kind and is_number(kind):
             return self.cast(self.text(node), have, kind)
         return self.text_as(node, kind, OR)
 
     # ---------------------------------------------------------------------------------------------------- calls
     def arguments(self, nodes: Sequence[ast.expr]) -> tuple[list[str], list[Type]]:
-        """Return the texts and types of arguments or items, starred ones spread out."""
+        """Write arguments or items, with starred ones unpacked.
+
+        Returns:
+            Texts and types, one of each per argument.
+        """
 
         def write(node: ast.expr) -> str:
             if not isinstance(node, ast.Starred):
                 return self.text(node)
             text = self.text(node.value)
-            return text if isinstance(node.value, ast.Name) else self.hold(self.function.known_type(node.value), text)
+            return text if isinstance(node.value, ast.Name) else self.hold(self.function.require_type(node.value), text)
 
         texts: list[str] = []
         kinds: list[Type] = []
         for node, text in zip(nodes, self.ordered(nodes, write), strict=True):
             if isinstance(node, ast.Starred):
-                kind = self.function.known_type(node.value)
+                kind = self.function.require_type(node.value)
                 assert isinstance(kind, Tuple)
                 texts += [self.item(text, kind, index) for index in range(len(kind.parts))]
                 kinds += kind.parts
             else:
                 texts.append(text)
-                kinds.append(self.function.known_type(node))
+                kinds.append(self.function.require_type(node))
         return texts, kinds
 
     def call(self, node: ast.Call, function: Any, nodes: Sequence[ast.expr]) -> Code:
         """Return the text of a call."""
         texts, kinds = self.arguments(nodes)
         if (intrinsic := self.function.intrinsic(function)) is not None:
-            result = self.function.known_type(node)
+            result = self.function.require_type(node)
             text = intrinsic.write(texts, kinds, result)
             return Code(text)
         if is_record_class(function):
-            kind = self.function.known_type(node)
+            kind = self.function.require_type(node)
             assert isinstance(kind, Tuple)
             for name in function._fields[len(texts) :]:
                 default = function._field_defaults[name]
@@ -485,7 +489,7 @@ class ExpressionWriter:
                 kinds.append(self._constant_type(default))
             return Code(self.build(kind, texts, kinds))
         if isinstance(function, FunctionType):
-            complete = self.function.with_defaults(function, tuple(kinds))
+            complete = self.function.complete_arguments(function, tuple(kinds))
             defaults = (function.__defaults__ or ())[len(kinds) - len(complete) :] if len(complete) > len(kinds) else ()
             texts += [self.constant(f"{function.__name__}_default", value).text for value in defaults]
             called = self.function.specialise(function, complete)

@@ -1,7 +1,7 @@
 """Types of the variables and expressions of one function, for given types of its arguments.
 
 A function is read again and again until no type changes: within a loop, a variable may be used before the statement
-that decides its type. Annotations are ignored, because a law of forces serves floats and numbers with derivatives.
+that decides its type. Annotations are ignored, because one force law serves floats and numbers with derivatives.
 """
 
 from __future__ import annotations
@@ -37,8 +37,10 @@ MAX_ROUNDS = 20
 INTEGER_OPERATORS = ast.BitAnd, ast.BitOr, ast.BitXor, ast.LShift, ast.RShift
 
 
-READS, WRITES = 1, 2
-"""What the evaluation of an expression may do with memory, as bits; it decides where the order matters."""
+READS = 1
+"""Bit of an expression that may read memory: it must stay behind earlier writes."""
+WRITES = 2
+"""Bit of an expression that may write memory: it must keep its order beside other expressions."""
 
 
 class Specialisation(Kernel):
@@ -81,14 +83,14 @@ class Specialisation(Kernel):
     def _infer(self) -> None:
         for _ in range(MAX_ROUNDS):
             before = dict(self.variables), self.result
-            # Types that were found before a variable became wider are found once more.
+            # A variable may have become wider: infer all types again.
             self._types.clear()
             for statement in self.body:
                 self._infer_statement(statement)
             if (self.variables, self.result) == before:
                 break
         else:
-            raise self.refuse(self.tree.args, "its types are found in no number of rounds")
+            raise self.refuse(self.tree.args, f"its types do not converge in {MAX_ROUNDS} rounds")
         if self.result is None:
             self.result = VOID
         elif not leaves(self.body):
@@ -179,7 +181,7 @@ class Specialisation(Kernel):
         kind = self._types[node] = self._type_of(node)
         return kind
 
-    def known_type(self, node: ast.expr) -> Type:
+    def require_type(self, node: ast.expr) -> Type:
         """Return the type of an expression.
 
         Raises:
@@ -210,7 +212,7 @@ class Specialisation(Kernel):
                     return kind.parts[kind.record._fields.index(name)]
                 raise self.refuse(node)
             case ast.Tuple(elts=parts):
-                items = self.types_of(parts)
+                items = self.infer_types(parts)
                 return None if items is None else tuple_of(items)
             case ast.Subscript(value=owner, slice=index):
                 return self._type_of_item(node, owner, index)
@@ -311,17 +313,17 @@ class Specialisation(Kernel):
         return INTEGER if kind is BOOLEAN else kind
 
     def _type_of_call(self, node: ast.Call, function: Any, arguments: Sequence[ast.expr]) -> Type | None:
-        kinds = self.types_of(arguments)
+        kinds = self.infer_types(arguments)
         if isinstance(function, FunctionType) and function not in INTRINSICS:
             if kinds is None:
                 return None
-            called = self.specialise(function, self.with_defaults(function, kinds))
+            called = self.specialise(function, self.complete_arguments(function, kinds))
             self.effects |= called.effects
             return called.result
         if is_record_class(function):
             if kinds is None:
                 return None
-            kinds = self.with_field_defaults(function, kinds)
+            kinds = self.complete_fields(function, kinds)
             if len(kinds) != len(function._fields):
                 raise self.refuse(node, f"{function.__name__} has {len(function._fields)} fields")
             return tuple_of(kinds, function)
@@ -366,7 +368,7 @@ class Specialisation(Kernel):
         return isinstance(node, ast.Call) and not node.keywords and self.value(node.func) is range
 
     def constant_index(self, node: ast.expr) -> int | None:
-        """Return the value of an integer constant; None if an expression is none."""
+        """Return the value of an integer constant, or None for any other expression."""
         match node:
             case ast.Constant(value=int() as value):
                 return value
@@ -381,8 +383,12 @@ class Specialisation(Kernel):
         """Return whether an expression is a negative integer constant."""
         return node is not None and (self.constant_index(node) or 0) < 0
 
-    def types_of(self, nodes: Sequence[ast.expr]) -> tuple[Type, ...] | None:
-        """Return the types of arguments or items, starred ones spread out; None where one is not known yet."""
+    def infer_types(self, nodes: Sequence[ast.expr]) -> tuple[Type, ...] | None:
+        """Infer the types of arguments or items, with starred ones unpacked.
+
+        Returns:
+            One type per argument, or None while one of them is not known.
+        """
         result: list[Type | None] = []
         for node in nodes:
             if isinstance(node, ast.Starred):
@@ -396,15 +402,15 @@ class Specialisation(Kernel):
         return known if len(known) == len(result) else None
 
     @staticmethod
-    def with_defaults(function: FunctionType, kinds: tuple[Type, ...]) -> tuple[Type, ...]:
-        """Return the types of all arguments of a call, those that have their default included."""
+    def complete_arguments(function: FunctionType, kinds: tuple[Type, ...]) -> tuple[Type, ...]:
+        """Return the types of all arguments of a call, including those left at their defaults."""
         rest = function.__code__.co_argcount - len(kinds)
         defaults = (function.__defaults__ or ())[-rest:] if rest > 0 else ()
         return kinds + tuple(kind for kind in map(type_of_constant, defaults) if kind is not None)
 
     @staticmethod
-    def with_field_defaults(record: Any, kinds: tuple[Type, ...]) -> tuple[Type, ...]:
-        """Return the types of all fields of a new named tuple, those that have their default included."""
+    def complete_fields(record: Any, kinds: tuple[Type, ...]) -> tuple[Type, ...]:
+        """Return the types of all fields of a new named tuple, including those left at their defaults."""
         rest = record._fields[len(kinds) :]
         defaults = [type_of_constant(record._field_defaults[name]) for name in rest if name in record._field_defaults]
         return kinds + tuple(kind for kind in defaults if kind is not None)
@@ -426,9 +432,9 @@ class Specialisation(Kernel):
             function = self.called(node.func)
             if (intrinsic := self.intrinsic(function)) is not None:
                 return READS | WRITES if intrinsic.has_effects else 0
-            kinds = self.types_of(node.args)
+            kinds = self.infer_types(node.args)
             if isinstance(function, FunctionType) and kinds is not None:
-                return self.specialise(function, self.with_defaults(function, kinds)).effects
+                return self.specialise(function, self.complete_arguments(function, kinds)).effects
         return 0
 
 

@@ -74,7 +74,7 @@ def _dual_or_float(kinds: Types) -> Type:
     return next((kind for kind in kinds if isinstance(kind, Dual)), FLOAT)
 
 
-def _as_floats(codes: Sequence[str], kinds: Types) -> list[str]:
+def _convert_to_floats(codes: Sequence[str], kinds: Types) -> list[str]:
     """Return the texts of numbers with integers as floats."""
     return [cast_to(code, kind, FLOAT) if is_integral(kind) else code for code, kind in zip(codes, kinds, strict=True)]
 
@@ -88,12 +88,12 @@ def _mathematics(name: str, count: int) -> Intrinsic:
         return _dual_or_float(kinds)
 
     def write(codes: Sequence[str], kinds: Types, result: Type) -> str:
-        return f"py::{name}({', '.join(_as_floats(codes, kinds))})"
+        return f"py::{name}({', '.join(_convert_to_floats(codes, kinds))})"
 
     return Intrinsic(infer, write)
 
 
-def _fixed(name: str, result: Type) -> Intrinsic:
+def _declare_fixed_result(name: str, result: Type) -> Intrinsic:
     """A function of one number whose result has the same type for every argument."""
 
     def infer(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
@@ -101,7 +101,7 @@ def _fixed(name: str, result: Type) -> Intrinsic:
         return result
 
     def write(codes: Sequence[str], kinds: Types, result: Type) -> str:
-        return f"py::{name}({_as_floats(codes, kinds)[0]})"
+        return f"py::{name}({_convert_to_floats(codes, kinds)[0]})"
 
     return Intrinsic(infer, write, result)
 
@@ -206,7 +206,7 @@ def _infer_settled(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
 
 
 def _write_settled(codes: Sequence[str], kinds: Types, result: Type) -> str:
-    return f"py::settled({', '.join(_as_floats(codes, kinds))})"
+    return f"py::settled({', '.join(_convert_to_floats(codes, kinds))})"
 
 
 def _infer_plain(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
@@ -215,7 +215,9 @@ def _infer_plain(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
 
 
 def _write_plain(name: str) -> Callable[[Sequence[str], Types, Type], str]:
-    return lambda codes, kinds, result: f"py::{name}({', '.join([*_as_floats(codes[:1], kinds[:1]), *codes[1:]])})"
+    return lambda codes, kinds, result: (
+        f"py::{name}({', '.join([*_convert_to_floats(codes[:1], kinds[:1]), *codes[1:]])})"
+    )
 
 
 def _infer_carrying(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
@@ -226,7 +228,7 @@ def _infer_carrying(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
 
 
 def _write_carrying(codes: Sequence[str], kinds: Types, result: Type) -> str:
-    return f"{result!r}::along({_as_floats(codes[:1], kinds[:1])[0]}, {codes[1]})"
+    return f"{result!r}::along({_convert_to_floats(codes[:1], kinds[:1])[0]}, {codes[1]})"
 
 
 def _infer_carrying_room(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
@@ -249,9 +251,9 @@ INTRINSICS: dict[Any, Intrinsic] = {
     math.atan2: _mathematics("atan2", 2),
     math.copysign: _mathematics("copysign", 2),
     math.fabs: _mathematics("abs", 1),
-    math.isnan: _fixed("isnan", BOOLEAN),
-    math.isfinite: _fixed("isfinite", BOOLEAN),
-    math.isinf: _fixed("isinf", BOOLEAN),
+    math.isnan: _declare_fixed_result("isnan", BOOLEAN),
+    math.isfinite: _declare_fixed_result("isfinite", BOOLEAN),
+    math.isinf: _declare_fixed_result("isinf", BOOLEAN),
     math.floor: Intrinsic(_infer_integer, _write_rounded("floor"), INTEGER),
     math.ceil: Intrinsic(_infer_integer, _write_rounded("ceil"), INTEGER),
     int: Intrinsic(_infer_integer, _write_integer, INTEGER),
@@ -263,7 +265,7 @@ INTRINSICS: dict[Any, Intrinsic] = {
     pointers.at: Intrinsic(_infer_offset, lambda codes, kinds, result: f"({codes[0]} + {codes[1]})"),
     pointers.call: Intrinsic(_infer_call, _write_call, INTEGER, has_effects=True),
     carried.settled: Intrinsic(_infer_settled, _write_settled),
-    carried.is_nothing: _fixed("is_nothing", BOOLEAN),
+    carried.is_nothing: _declare_fixed_result("is_nothing", BOOLEAN),
     carried.plain: Intrinsic(_infer_plain, _write_plain("plain"), FLOAT),
     carried.slope_of: Intrinsic(_infer_plain, _write_plain("slope_of"), FLOAT),
     carried.carrying: Intrinsic(_infer_carrying, _write_carrying),

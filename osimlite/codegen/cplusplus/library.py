@@ -63,7 +63,7 @@ class Library:
 
     @property
     def specialisations(self) -> list[Specialisation]:
-        """The functions whose types were inferred, of which some may not be called in the end."""
+        """Functions whose types were inferred; some of them may not be called."""
         return [*self._specialisations.values()]
 
     # -------------------------------------------------------------------------------------------------- writing
@@ -96,7 +96,7 @@ class Library:
             for given, kind in zip(specialisation.given, kinds, strict=True)
         )
         call = f"{name}({', '.join(map(escape_name, specialisation.given))})"
-        # Who calls a kernel reads an integer, of which a truth value would fill one byte only.
+        # Callers read an integer of eight bytes, and a truth value would fill one of them.
         result = INTEGER if specialisation.result is BOOLEAN else specialisation.result
         head = f"OSIMLITE_EXPORT {self.name_type(result)} {symbol}({parameters})"
         self.exports[symbol] = f"{head} {{\n    return {call};\n}}"

@@ -139,7 +139,7 @@ class FunctionWriter(ExpressionWriter):
             kind = self._variable_type(name, iterated)
             items = self.ordered(iterated.elts, self.text)
             parts = [
-                self.cast(text, self.function.known_type(part), kind)
+                self.cast(text, self.function.require_type(part), kind)
                 for text, part in zip(items, iterated.elts, strict=True)
             ]
             array = self.new_name("items")
@@ -151,7 +151,7 @@ class FunctionWriter(ExpressionWriter):
     def _variable_type(self, name: str, iterated: ast.Tuple) -> Type:
         kind = self.function.variables.get(name) if name != "_" else None
         for part in iterated.elts:
-            kind = kind or self.function.known_type(part)
+            kind = kind or self.function.require_type(part)
         assert kind is not None
         return kind
 
@@ -181,7 +181,7 @@ class FunctionWriter(ExpressionWriter):
     # ------------------------------------------------------------------------------------------- assignments
     def assign(self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.expr) -> list[str]:
         """Return the lines of an assignment to one target or several."""
-        kind = self.function.known_type(value)
+        kind = self.function.require_type(value)
         if isinstance(kind, Callee):
             return []
         if len(targets) == 1 and not isinstance(targets[0], ast.Tuple):
@@ -211,25 +211,25 @@ class FunctionWriter(ExpressionWriter):
         return [f"{self.text(target)} = {text};"]
 
     def _assign_items(self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.Tuple) -> list[str]:
-        """Return the lines of an assignment of several values, all of which are computed before any is stored."""
+        """Return the lines of a tuple assignment: all values are computed before the first is stored."""
         first = targets[0]
         assert isinstance(first, ast.Tuple)
         stored = {part.id for part in first.elts if isinstance(part, ast.Name)}
         lines: list[str] = []
         if len(targets) == 1 and self._is_independent(first, value, stored):
             for target, part in zip(first.elts, value.elts, strict=True):
-                own = self._assign_one(node, target, part, self.function.known_type(part))
+                own = self._assign_one(node, target, part, self.function.require_type(part))
                 lines += [*self._take_pending(), *own]
             return lines
         held = []
         for part in value.elts:
             text = self.text(part)
-            held.append(text if isinstance(part, ast.Constant) else self.hold(self.function.known_type(part), text))
+            held.append(text if isinstance(part, ast.Constant) else self.hold(self.function.require_type(part), text))
             lines += self._take_pending()
         for target in targets:
             assert isinstance(target, ast.Tuple)
             for target_part, text, part in zip(target.elts, held, value.elts, strict=True):
-                lines += self.store(node, target_part, text, self.function.known_type(part))
+                lines += self.store(node, target_part, text, self.function.require_type(part))
         return lines
 
     def _is_independent(self, target: ast.Tuple, value: ast.Tuple, stored: set[str]) -> bool:
@@ -277,10 +277,10 @@ class FunctionWriter(ExpressionWriter):
 
     def augment(self, node: ast.AugAssign, target: ast.expr, op: ast.operator, value: ast.expr) -> list[str]:
         """Return the lines of an augmented assignment."""
-        kinds = [self.function.known_type(to_load(target)), self.function.known_type(value)]
+        kinds = [self.function.require_type(to_load(target)), self.function.require_type(value)]
         is_written = bool(self.function.effects_of(value) & WRITES)
         if isinstance(target, ast.Subscript):
-            place = f"{self.text(target.value)}[{self._held_index(target.slice, is_written)}]"
+            place = f"{self.text(target.value)}[{self._store_index(target.slice, is_written)}]"
         else:
             place = self.text(target)
         before = self.hold(kinds[0], place) if is_written and isinstance(target, ast.Subscript) else place
@@ -290,10 +290,10 @@ class FunctionWriter(ExpressionWriter):
         texts = [before, self._operand(value, op, is_right=True)]
         return [f"{place} = {self.operation(texts, op, kinds, node).text};"]
 
-    def _held_index(self, node: ast.expr, is_written: bool) -> str:
+    def _store_index(self, node: ast.expr, is_written: bool) -> str:
         text = self.text(node)
         if self.function.effects_of(node) and is_written:
-            return self.hold(self.function.known_type(node), text)
+            return self.hold(self.function.require_type(node), text)
         return text
 
 
@@ -320,17 +320,17 @@ class VariablePlaces:
         self.constants = {name for name, count in stores.items() if count == 1}
         self._place(function.body, [name for name in function.own if name != "_"])
 
-    def _used(self, node: ast.AST) -> set[str]:
+    def _find_used_names(self, node: ast.AST) -> set[str]:
         """Return the names of all variables in a part of the function."""
         if node not in self._names:
             names = {node.id} if isinstance(node, ast.Name) else set()
-            self._names[node] = names.union(*map(self._used, ast.iter_child_nodes(node)))
+            self._names[node] = names.union(*map(self._find_used_names, ast.iter_child_nodes(node)))
         return self._names[node]
 
     def _place(self, body: Sequence[ast.stmt], names: Sequence[str]) -> None:
         """Find the place of variables that are used in one block only."""
         for name in names:
-            users = [statement for statement in body if name in self._used(statement)]
+            users = [statement for statement in body if name in self._find_used_names(statement)]
             first = users[0]
             if len(users) == 1 and self._place_within(first, name):
                 continue
@@ -353,13 +353,13 @@ class VariablePlaces:
                 for part in ast.walk(statement)
                 if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store)
             }
-            if name in stored or name in self._used(node.iter):
+            if name in stored or name in self._find_used_names(node.iter):
                 return False
             self.loop_variables.setdefault(node, set()).add(name)
             return True
-        if any(name in self._used(head) for head in heads):
+        if any(name in self._find_used_names(head) for head in heads):
             return False
-        users = [block for block in blocks if any(name in self._used(statement) for statement in block)]
+        users = [block for block in blocks if any(name in self._find_used_names(statement) for statement in block)]
         if len(users) != 1:
             return False
         self._place(users[0], [name])
@@ -376,7 +376,7 @@ class VariablePlaces:
                 return False
         parts = [part for target in targets for part in ast.walk(target)]
         count = sum(isinstance(part, ast.Name) and part.id == name for part in parts)
-        return count == 1 and name not in self._used(value)
+        return count == 1 and name not in self._find_used_names(value)
 
 
 @cache

@@ -55,7 +55,7 @@ class Dual(Type):
 
 
 class Pointer(Type):
-    """Vector of numbers, of which only the first address is known."""
+    """Vector of numbers, known by the address of the first."""
 
     __slots__ = ("element",)
 
@@ -86,7 +86,7 @@ class Tuple(Type):
 
     @property
     def is_array(self) -> bool:
-        """Whether it is a plain tuple whose items all have one type."""
+        """Return whether the type is a plain tuple whose items have one type."""
         return self.record is None and len({*self.parts}) == 1
 
 

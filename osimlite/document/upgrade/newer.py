@@ -48,7 +48,7 @@ _MARKS = (
 
 
 def find_newer_content(root: Element, version: int) -> NewerContent | None:
-    """Return the first element of a document that came after its version; None if there is none."""
+    """Return the first element of a document that is newer than its version, or None."""
     for element in root.iter(etree.Element):
         holder = as_written(element.tag)
         for pattern, tags in _MARKS:

@@ -36,7 +36,7 @@ def impossible_mechanism(subject: Subject, report: FindingSink) -> None:
       </Coordinate>
     ```
     """
-    for obstacle in _unreported(subject, report, Stage.MECHANISM):
+    for obstacle in _select_unreported(subject, report, Stage.MECHANISM):
         _report(subject, report, obstacle, obstacle.message)
 
 
@@ -60,7 +60,7 @@ def unmet_constraint(subject: Subject, report: FindingSink) -> None:
       </ConstantDistanceConstraint>
     ```
     """
-    for obstacle in _unreported(subject, report, Stage.ASSEMBLY):
+    for obstacle in _select_unreported(subject, report, Stage.ASSEMBLY):
         _report(subject, report, obstacle, f"{obstacle.message}: OpenSim cannot start from it")
 
 
@@ -84,7 +84,7 @@ def range_not_kept(subject: Subject, report: FindingSink) -> None:
       </Coordinate>
     ```
     """
-    for obstacle in _unreported(subject, report, Stage.CLAMP):
+    for obstacle in _select_unreported(subject, report, Stage.CLAMP):
         _report(subject, report, obstacle, f"{obstacle.message}; OpenSim simulates without the clamp")
 
 
@@ -117,7 +117,7 @@ def singular_mass_matrix(subject: Subject, report: FindingSink) -> None:
     """
     if _has_error(report, "2456"):
         return
-    for obstacle in _unreported(subject, report, Stage.INERTIA):
+    for obstacle in _select_unreported(subject, report, Stage.INERTIA):
         message = f"{obstacle.message}: OpenSim computes NaN, or accelerations without meaning"
         _report(subject, report, obstacle, message)
 
@@ -147,7 +147,7 @@ def impossible_force(subject: Subject, report: FindingSink) -> None:
     ```
     """
     doubtful = {item.component for item in report.findings if item.code == "OSIM207"}
-    for obstacle in _unreported(subject, report, Stage.FORCE):
+    for obstacle in _select_unreported(subject, report, Stage.FORCE):
         if obstacle.path in doubtful:
             # OpenSim computes with numbers that make no sense; osimlite does not.
             message = f"osimlite cannot compute this, OpenSim can: {obstacle.message}"
@@ -173,10 +173,10 @@ def no_acceleration(subject: Subject, report: FindingSink) -> None:
       </ExpressionBasedCoordinateForce>
     ```
     """
-    for obstacle in _unreported(subject, report, Stage.ACCELERATION):
+    for obstacle in _select_unreported(subject, report, Stage.ACCELERATION):
         if obstacle.path or not _has_error(report, "2456"):
             _report(subject, report, obstacle, obstacle.message)
-    for obstacle in _unreported(subject, report, Stage.RATE):
+    for obstacle in _select_unreported(subject, report, Stage.RATE):
         _report(subject, report, obstacle, obstacle.message, severity=WARNING)
 
 
@@ -204,7 +204,7 @@ def not_computed(subject: Subject, report: FindingSink) -> None:
     ```
     """
     groups: dict[object, list[Obstacle]] = {}
-    for obstacle in _unreported(subject, report, Stage.UNSUPPORTED):
+    for obstacle in _select_unreported(subject, report, Stage.UNSUPPORTED):
         item = subject.tree.by_path.get(obstacle.path)
         # Who declares the classes of a plug-in knows what they are.
         if isinstance(item, Unknown) or (item is not None and type(item).tag in further_classes()):
@@ -222,7 +222,7 @@ def not_computed(subject: Subject, report: FindingSink) -> None:
         _report(subject, report, first, message)
 
 
-def _unreported(subject: Subject, report: FindingSink, stage: Stage) -> Iterator[Obstacle]:
+def _select_unreported(subject: Subject, report: FindingSink, stage: Stage) -> Iterator[Obstacle]:
     """Yield the obstacles of a stage whose cause no other rule has reported."""
     errors = [item for item in report.findings if item.severity == ERROR]
     places = {item.component for item in errors if item.component}

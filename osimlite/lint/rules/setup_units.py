@@ -221,7 +221,7 @@ def _surfaces(setup: Setup, force: Any) -> Iterator[Any]:
 
 
 def _is_excluded(setup: Setup, tool: Any, force: Any) -> bool:
-    """Whether a tool switches a force of the model off."""
+    """Return whether a tool switches a force of the model off."""
     names = {str(name) for name in getattr(tool, "forces_to_exclude", ())}
     if "all" in {name.lower() for name in names} or force.name in names:
         return True

@@ -86,7 +86,7 @@ class KernelLibrary:
 
 @cache
 def load_library() -> KernelLibrary | None:
-    """Load the best library for this processor; None if there is none."""
+    """Load the best library for this processor, or return None without one."""
     for target in (NATIVE, X86_64_V3, BASELINE):
         path = FOLDER / f"kernels-{target}{library_suffix()}"
         if path.exists() and (target != X86_64_V3 or supports_v3()):

@@ -115,7 +115,7 @@ def _to_module(record: Record) -> ModuleType:
 
 
 def _link(function: Any, tools: _Tools) -> Any:
-    """Return a copy of a function that calls compiled functions in the place of those of this package."""
+    """Return a copy of a function in which calls within this package lead to compiled functions."""
     scope = dict(function.__globals__)
     for called in {item.argval for item in dis.get_instructions(function) if item.opname == "LOAD_GLOBAL"}:
         value = scope.get(called)
