@@ -38,7 +38,7 @@ def require(module: str, *, extra: str, purpose: str, instead: str = "") -> Modu
         return loaded
     cure = (f"take {instead}, or " if instead else "") + f"run: pip install 'osimlite[{extra}]'"
     try:
-        with away_from_current_folder():
+        with leave_current_folder():
             return import_module(module)
     except ModuleNotFoundError as error:
         if error.name == package:
@@ -66,8 +66,8 @@ def protect_processes() -> None:
 
 
 @contextmanager
-def away_from_current_folder() -> Iterator[None]:
-    """Import packages from a folder that nobody else has filled.
+def leave_current_folder() -> Iterator[None]:
+    """Work from the folder of this package, for the time of an import.
 
     Some look for files in the current folder while they are loaded: glfw for libraries, numba for
     `.numba_config.yaml`, matplotlib for `matplotlibrc`.
@@ -81,7 +81,7 @@ def away_from_current_folder() -> Iterator[None]:
         return
     os.environ[SAFE_PATH] = "1"
     path = list(sys.path)
-    # An empty entry means the current folder, whichever that is.
+    # An empty entry stands for the current folder.
     away = [os.path.abspath(entry) for entry in path if entry not in ("", ".")]
     sys.path[:] = away
     os.chdir(Path(__file__).parent)

@@ -42,7 +42,7 @@ def largest_file_in(file: Path, table: dict[str, Any]) -> int:
     """The most bytes of a file by the settings in `file`; OsimliteError if they make no sense."""
     given = table.get("largest-file", LARGEST_FILE / 1e6)
     is_number = isinstance(given, int | float) and not isinstance(given, bool)
-    # TOML has integers of any length, of which most are no floating-point number.
+    # TOML has integers of any length, most of them beyond the range of floats.
     if not is_number or not LARGEST_FILE / 1e6 <= given <= sys.float_info.max / 1e6:
         raise OsimliteError(
             f"'largest-file' must be a number of MB, {LARGEST_FILE / 1e6:g} or more, not '{given}'", file=str(file)

@@ -196,9 +196,9 @@ def _tell(error: BaseException, words: list[str]) -> NoReturn:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
     if isinstance(error, ModuleNotFoundError):
-        from osimlite.cli.doctor import bringing
+        from osimlite.cli.doctor import find_extra
 
-        extra = bringing(error.name, words[0])
+        extra = find_extra(error.name, words[0])
         if extra is None:
             raise error
         complain(f"'{words[0]}' needs {error.name}, which is not installed; run: pip install 'osimlite[{extra}]'")

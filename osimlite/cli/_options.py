@@ -179,7 +179,7 @@ def results_folder(file: Path, output: Path | None) -> Path:
 
     if output is not None:
         return output
-    # Nobody named it: a link of this name in a stranger's folder must not decide where results go.
+    # The user did not name it: a link of this name in a stranger's folder must not decide where results go.
     expect_folder_inside(Path(file.stem))
     return Path(file.stem)
 

@@ -179,8 +179,8 @@ def purposes(wanted: dict[str, list[str]]) -> dict[str, list[str]]:
     return result
 
 
-def bringing(module: str | None, use: str = "") -> str | None:
-    """Return the first extra that brings a module, and all else that a use of `NEEDS` needs; None if there is none."""
+def find_extra(module: str | None, use: str = "") -> str | None:
+    """Return the first extra with a module and all other packages of its use in `NEEDS`, or None."""
     name = {"PIL": "pillow", "yaml": "pyyaml"}.get(module or "", module)
     if name in NEEDS.get(use, ()):
         return next((extra for extra, uses in purposes(requirements()).items() if use in uses), None)

@@ -107,7 +107,7 @@ NOT_MEASURED = " not measured: "
 
 
 class NotMeasured(NamedTuple):
-    """A note on a file of which some rules were not measured, for want of the numeric packages."""
+    """Note on a file for which some rules did not run, because numeric packages are missing."""
 
     file: str
     code: str  # with which the codes of the first of these rules begin

@@ -332,8 +332,8 @@ MAX_SHORT_LINES = 3
 """Lines of an ignoring comment that is found by its lines; others are asked for each finding."""
 
 
-def _ignored_by(comments: list[Suppression]) -> Callable[[Finding], bool]:
-    """Return what tells whether a comment ignores a finding; each comment notes that it was of use."""
+def _make_ignore_test(comments: list[Suppression]) -> Callable[[Finding], bool]:
+    """Return a test of whether a comment ignores a finding; it records which comments were used."""
     by_line: dict[int, list[Suppression]] = {}
     long: list[Suppression] = []
     for comment in comments:
@@ -354,7 +354,7 @@ def _not_ignored(
     subject: Checked, comments: list[Suppression], findings: list[Finding], left_out: list[Rule]
 ) -> list[Finding]:
     """The findings without those that a comment of the file ignores, and with one for each comment without use."""
-    is_ignored = _ignored_by(comments)
+    is_ignored = _make_ignore_test(comments)
     kept = [finding for finding in findings if not is_ignored(finding)]
     unused = next(known for known in all_rules() if known.name == "unused-ignore")
     if subject.config.wants(unused):

@@ -96,7 +96,7 @@ def _on_surfaces(paths: Paths, start: Array, looked_at: list[Sweep]) -> Iterator
 
 
 def _expect_few_loops(mechanism: Mechanism) -> None:
-    """Refuse models with so many loops that poses cannot be assembled in the time of a check.
+    """Refuse models with too many loops to assemble poses within the time of a check.
 
     Couplers are not counted: a spine has a hundred, and they are assembled at once.
 

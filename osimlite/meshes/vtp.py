@@ -26,8 +26,8 @@ MAX_BYTES = 400_000_000
 """Bytes of all numbers of a file, decompressed. A mesh of a million points has about 50 MB of them."""
 
 
-def _inflated(block: bytes, size: int) -> bytes:
-    """Decompress a block of zlib to at most `size` bytes; ValueError if there is more."""
+def _inflate(block: bytes, size: int) -> bytes:
+    """Decompress a block of zlib to at most `size` bytes; raise ValueError for more."""
     stream = zlib.decompressobj()
     data = stream.decompress(block, size + 1)
     if len(data) > size or not stream.eof:
@@ -35,8 +35,8 @@ def _inflated(block: bytes, size: int) -> bytes:
     return data
 
 
-def _expanded(block: bytes, size: int) -> bytes:
-    """Decompress a block of LZMA to at most `size` bytes; ValueError if there is more."""
+def _expand(block: bytes, size: int) -> bytes:
+    """Decompress a block of LZMA to at most `size` bytes; raise ValueError for more."""
     stream = lzma.LZMADecompressor(memlimit=MAX_BYTES)
     data = stream.decompress(block, size + 1)
     if len(data) > size or not stream.eof:
@@ -45,8 +45,8 @@ def _expanded(block: bytes, size: int) -> bytes:
 
 
 _DECOMPRESS: dict[str, Callable[[bytes, int], bytes]] = {
-    "vtkZLibDataCompressor": _inflated,
-    "vtkLZMADataCompressor": _expanded,
+    "vtkZLibDataCompressor": _inflate,
+    "vtkLZMADataCompressor": _expand,
 }
 
 _TYPES = {

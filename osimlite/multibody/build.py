@@ -278,7 +278,7 @@ RIGHT_ANGLE_GAP = 1e-6
 
 
 def avoid_right_angle(angle: float) -> float:
-    """Return an angle (rad), moved to `RIGHT_ANGLE_GAP` from 90 or -90 degrees if it is nearer.
+    """Return an angle (rad) that is at least `RIGHT_ANGLE_GAP` away from 90 and -90 degrees.
 
     OpenSim describes ball and free joints by quaternions, which have no singular pose; the rates of
     three angles are infinite where the second is exactly there. A motion that starts beside it is

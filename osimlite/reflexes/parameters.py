@@ -12,7 +12,7 @@ import numpy as np
 from osimlite.errors import DocumentError
 from osimlite.files import read_file
 from osimlite.multibody.spatial import Array
-from osimlite.reflexes.settings import Node, as_finite
+from osimlite.reflexes.settings import Node, parse_finite
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _FORM = re.compile(rf"(?P<mean>{_NUMBER})?(?:~(?P<std>{_NUMBER})?)?(?:<(?P<low>{_NUMBER}),(?P<high>{_NUMBER})>)?$")
@@ -125,7 +125,7 @@ def read_par(path: str | Path) -> dict[str, tuple[float, float, float]]:
         if not words:
             continue
         try:
-            best, mean, std = (as_finite(word) for word in words[1:4])
+            best, mean, std = (parse_finite(word) for word in words[1:4])
         except ValueError:
             raise DocumentError(
                 "a name, best, mean and standard deviation are wanted", file=str(path), line=number

@@ -137,7 +137,7 @@ class Node:
         """
         text = self.text(key, otherwise)
         try:
-            x, y, z = map(as_finite, text.split())
+            x, y, z = map(parse_finite, text.split())
         except ValueError:
             raise (self.get(key) or self).error(f"'{key}' must be three numbers, as [ 0 0 1 ], not '{text}'") from None
         return np.array([x, y, z])
@@ -174,8 +174,8 @@ class Node:
                 raise node.error(f"'{name}' of {what} is not done here{near}")
 
 
-def as_finite(word: str) -> float:
-    """Return the number that a word is; ValueError if it is none, infinite or NaN."""
+def parse_finite(word: str) -> float:
+    """Parse a finite number; raise ValueError for anything else."""
     number = float(word)
     if not math.isfinite(number):
         raise ValueError(f"{word} is not finite")
@@ -281,7 +281,7 @@ def _fill_from_yaml(node: Node, found: Any, path: Path, base: Path, depth: int, 
                 raise DocumentError(
                     "'include' must be the name of one file", file=node.file, line=value.start_mark.line + 1
                 )
-            included = _included_file(value.value, path, base)
+            included = _resolve_include(value.value, path, base)
             node.parts += _read(included, base, {}, depth + 1, budget).parts
             continue
         several = value.value if value.id == "sequence" else [value]
@@ -367,7 +367,7 @@ class _Reader:
         return value.strip('"')
 
     def _included(self, name: str) -> Node:
-        included = _included_file(name, self.path, self.base)
+        included = _resolve_include(name, self.path, self.base)
         return _read(included, self.base, self.constants, self.depth + 1, self.budget)
 
 
@@ -376,8 +376,8 @@ def matches(name: str, patterns: str) -> bool:
     return any(fnmatchcase(name, pattern) for pattern in patterns.split(";") if pattern)
 
 
-def _included_file(name: str, path: Path, base: Path) -> Path:
-    """Return the file that `path` includes.
+def _resolve_include(name: str, path: Path, base: Path) -> Path:
+    """Return the path of an included file.
 
     Errors in it quote its words, so that it must not be any file of the user: it has an ending of
     settings, is in the folders of the scenario, and is not hidden; the same holds of what a link

@@ -126,7 +126,7 @@ _ATTRIBUTE = re.compile(r"([^\s=]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 
 
 def _compare_contents(path: str, way: str, old: str, new: str) -> Iterator[Difference]:
-    """Yield the values that differ in the XML of two objects of a class that nobody knows.
+    """Yield the values that differ in the XML of two objects of an unknown class.
 
     White space around values and between elements, comments, and the spelling of numbers do not
     count.

@@ -557,7 +557,7 @@ class System:
         return self.looked(moments, places, STAGE.VELOCITY).reshape(len(moments), len(chosen), size)
 
     def read_records(self) -> Iterator[tuple[ForceElement, list[list[float]]]]:
-        """Each element with the records of its items, after an evaluation."""
+        """Return each force element with the records of its items after an evaluation."""
         work = self._w.tolist()
         for element, items in zip(self.forces.elements, self._items, strict=True):
             yield element, [work[place : place + room] for place, room in items]

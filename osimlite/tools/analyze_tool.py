@@ -73,7 +73,7 @@ def run(job: Job, outcome: Outcome) -> None:
 
 
 def equilibrate_rows(outcome: Outcome, simulation: Simulation, times: Array, states: Array) -> dict[str, BoolArray]:
-    """Bring the muscles into equilibrium at every time; say which have none, and when.
+    """Equilibrate the muscles at every time, and report which have no equilibrium and when.
 
     Like OpenSim's AnalyzeTool, this goes on where a muscle has no equilibrium. OpenSim leaves the fibers of that muscle
     in any state then, and computes forces and accelerations from it; here its states become NaN.

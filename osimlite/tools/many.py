@@ -241,7 +241,7 @@ class _Journal:
         self.path, self.noted = folder / JOURNAL, dict[str, Trial]()
         self._saved, self._is_kept = time.monotonic(), is_kept
         lines: list[bytes] = []
-        # A journal that cannot be read, or is no file, is none; the work is done again.
+        # Without a readable journal the work is done again.
         with suppress(OsimliteError):
             lines = read_file(self.path).splitlines() if resume else []
         for line in lines:

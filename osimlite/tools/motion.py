@@ -92,7 +92,7 @@ class Motion:
 
     @cached_property
     def balanced(self) -> BoolArray:
-        """Whether every muscle that needs an equilibrium has one, at each time (t,)."""
+        """Return for each time (t,) whether every muscle that needs an equilibrium has one."""
         return ~np.any([np.zeros(len(self.times), dtype=bool), *self.unbalanced.values()], axis=0)
 
     @cached_property
@@ -106,11 +106,11 @@ class Motion:
             rows = (missing == pattern).all(axis=1)
             part = self.select(rows)
             if pattern.any():
-                part = self._without(part, frozenset(np.array(names)[pattern].tolist()))
+                part = self._switch_off_muscles(part, frozenset(np.array(names)[pattern].tolist()))
             result.append((rows, part))
         return result
 
-    def _without(self, part: Motion, muscles: frozenset[str]) -> Motion:
+    def _switch_off_muscles(self, part: Motion, muscles: frozenset[str]) -> Motion:
         """Return a part of the motion with a model in which some muscles are switched off."""
         assert self.simulate is not None
         model = self.model.copy_deep()

@@ -135,7 +135,7 @@ def run(
 
 
 def substitute_inputs(top: Object, folder: Path, substitutes: Mapping[str, str]) -> list[str]:
-    """Have a document name other files in the place of some of its inputs.
+    """Replace the names of some input files in a document.
 
     Args:
         top: the document, which is changed.
@@ -165,13 +165,13 @@ def substitute_inputs(top: Object, folder: Path, substitutes: Mapping[str, str])
 
 
 def _is_about_any(error: Finding, names: Sequence[str]) -> bool:
-    """Whether an error is about one of some files: missing or old, as others are read in the place of these."""
+    """Return whether an error is about an input that is replaced, and so does not matter."""
     own = os.path.basename(error.file or "")
     return any(f"'{name}'" in error.message or own == os.path.basename(name) for name in names)
 
 
 def _is_run_by_opensim(error: Finding) -> bool:
-    """Whether OpenSim runs a setup in spite of an error: it leaves a property at its default, and says so in its log.
+    """Return whether OpenSim runs a setup in spite of an error, with a property at its default.
 
     A study of Moco, which is searched for long, should have none of these.
     """

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from osimlite._require import SAFE_PATH, away_from_current_folder, protect_processes, require
+from osimlite._require import SAFE_PATH, leave_current_folder, protect_processes, require
 
 ROOT = Path(osimlite.__file__).parents[1]
 MODULES = ("ctypes", "numpy", "json", "textwrap", "subprocess", "yaml", "lxml", "casadi", "random", "signal")
@@ -75,7 +75,7 @@ def test_packages_are_imported_from_another_folder(trap: Path, monkeypatch: pyte
     monkeypatch.syspath_prepend("")
     monkeypatch.delenv(SAFE_PATH, raising=False)
     before = list(sys.path)
-    with away_from_current_folder():
+    with leave_current_folder():
         assert Path.cwd() != trap and "" not in sys.path
         assert os.environ[SAFE_PATH] == "1"
         sys.path.insert(0, "/added")

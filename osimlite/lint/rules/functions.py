@@ -214,7 +214,7 @@ def function_of_several(subject: Subject, report: FindingSink) -> None:
       </CoordinateCouplerConstraint>
     ```
     """
-    for holder, count, held in _on_coordinates(subject):
+    for holder, count, held in _find_functions_of_coordinates(subject):
         function = held
         while isinstance(function, MultiplierFunction):
             function = function.function
@@ -297,7 +297,7 @@ _OF_ONE: Final = (
 )
 
 
-def _on_coordinates(subject: Subject) -> Iterator[tuple[Object, int, Function | None]]:
+def _find_functions_of_coordinates(subject: Subject) -> Iterator[tuple[Object, int, Function | None]]:
     """Yield the functions of coordinates: what they belong to, the number of coordinates, the function."""
     for joint in subject.named("CustomJoint"):
         # An axis without coordinates takes any function that needs none.
@@ -310,7 +310,7 @@ def _on_coordinates(subject: Subject) -> Iterator[tuple[Object, int, Function | 
 
 def _linear(subject: Subject) -> Iterator[tuple[Object, int, LinearFunction]]:
     """The linear functions of several variables: what they belong to, how many variables, and the function."""
-    for holder, count, held in _on_coordinates(subject):
+    for holder, count, held in _find_functions_of_coordinates(subject):
         function = held
         while isinstance(function, MultiplierFunction):
             function = function.function

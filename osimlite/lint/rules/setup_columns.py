@@ -43,7 +43,7 @@ def missing_column(setup: Setup, found: FindingSink) -> None:
             for column in table.columns
         }
         lacking = sorted(name for name in names - columns if not setup.is_bound(name))
-        if not names & columns and names & _named_by_paths(table):
+        if not names & columns and names & _find_names_in_paths(table):
             found(
                 f"'{getattr(item, tag)}' names the coordinates by paths: OpenSim's inverse dynamics does not know "
                 "these, and computes the moments of the default pose; osimlite knows them",
@@ -90,7 +90,7 @@ def missing_column(setup: Setup, found: FindingSink) -> None:
                     )  # fmt: skip
 
 
-def _named_by_paths(table: Table) -> set[str]:
+def _find_names_in_paths(table: Table) -> set[str]:
     """Return the names of coordinates whose values columns name by paths, as files of states of any age do."""
     paths = [column.split("/") for column in table.columns if "/" in column]
     return {parts[-2] if parts[-1] == "value" else parts[-1] for parts in paths}

@@ -18,8 +18,10 @@ from osimlite.text import counted
 
 _LEAST, _MOST = 0.5, 2.0
 """Between these a factor that scales a body can be believed."""
-_FEW_ROWS, _MOST_ROWS = 3, 100
-"""How many of the rows that a table has ready must be of the times of a tool, and else how many are read."""
+_FEW_ROWS = 3
+"""Sampled rows within the time range of the tool that suffice; with fewer, the table is read."""
+_MOST_ROWS = 100
+"""Rows that are read from a table at most."""
 _SIDES = (("R", "L"), ("r", "l"), ("Right", "Left"), ("right", "left"), ("RIGHT", "LEFT"))
 """How names tell sides."""
 

@@ -217,7 +217,7 @@ def _acting(setup: Setup, force: Any, table: Table | None, motion: Table) -> lis
 
 @once
 def _points_of(setup: Setup) -> dict[str, list[Vector]]:
-    """By name of each body, what is known to lie on it, m: its mass centre, frames of joints, markers and contacts."""
+    """Return known points on each body by its name (m): mass centre, joint frames, markers and contacts."""
     subject = model_subject(setup)
     result: dict[str, list[Vector]] = {}
 

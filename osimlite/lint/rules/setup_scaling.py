@@ -173,7 +173,7 @@ def scale_setting(setup: Setup, found: FindingSink) -> None:
 
 
 def _check_static_times(setup: Setup, placer: Any, found: FindingSink) -> None:
-    """Report a static trial of which the times of the placer hold one moment only, or none."""
+    """Report a static trial with one frame or none within the time range of the marker placer."""
     table = setup.table(placer.marker_file)
     if table is None or table.span is None or not table.is_markers:
         return

@@ -178,7 +178,7 @@ def _text(owner: Object, spec: FieldSpec) -> str:
 
 
 def _is_refused(note: Note, spec: FieldSpec, kind: Value) -> bool:
-    """Whether OpenSim refuses to load a file for a value that it cannot read."""
+    """Return whether OpenSim refuses to load a file for a value that it cannot read."""
     return note.value is None and (kind.legacy or (spec.tag == "mass" and spec.default != spec.default))
 
 

@@ -83,16 +83,16 @@ class _Compiled(Code):
     def chosen_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
         if not machine_code.can_prepare((*functions, *later)):
             warn_of_python()
-            return self._in_python()
+            return self._fall_back_to_python()
         try:
             self.make_ready(functions)
         except CompilationError as error:
             warn_of_python(str(error))
-            return self._in_python()
+            return self._fall_back_to_python()
         return self
 
-    def _in_python(self) -> Code:
-        """Return what runs the kernels where they cannot be compiled."""
+    def _fall_back_to_python(self) -> Code:
+        """Return the code to use where kernels cannot be compiled."""
         return PYTHON
 
     def make_ready(self, functions: Sequence[str]) -> None:
@@ -147,15 +147,16 @@ class Tangents(_Compiled):
         """Return this, or Python where the functions cannot be compiled."""
         if not machine_code.can_prepare([name + self._suffix for name in (*functions, *later)]):
             warn_of_python()
-            return self._in_python()
+            return self._fall_back_to_python()
         try:
             self.make_ready(functions)
         except CompilationError as error:
             warn_of_python(str(error))
-            return self._in_python()
+            return self._fall_back_to_python()
         return self
 
-    def _in_python(self) -> Code:
+    def _fall_back_to_python(self) -> Code:
+        """Return Python code whose numbers carry derivatives."""
         return PythonTangents(self._width - 1)
 
     def make_ready(self, functions: Sequence[str]) -> None:

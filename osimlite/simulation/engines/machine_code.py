@@ -20,8 +20,16 @@ from osimlite.text import or_known
 VARIABLE = "OSIMLITE_KERNELS"
 """Environment variable that names the only source of machine code."""
 
-LIBRARY, COMPILER, NUMBA, PYTHON = SOURCES = "library", "compiler", "numba", "python"
-"""Sources of machine code, in the order in which they are asked; "python" is none."""
+LIBRARY = "library"
+"""Source of kernels: the library compiled at installation."""
+COMPILER = "compiler"
+"""Source of kernels: a C++ compiler on this machine, one kernel at a time."""
+NUMBA = "numba"
+"""Source of kernels: numba, one kernel at a time."""
+PYTHON = "python"
+"""Source of kernels: their Python text, interpreted."""
+SOURCES = LIBRARY, COMPILER, NUMBA, PYTHON
+"""All sources in the order in which they are tried."""
 
 _addresses: dict[str, int] = {}
 """Addresses of the laws that are ready, by name."""

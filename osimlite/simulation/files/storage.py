@@ -186,7 +186,7 @@ def _header(name: str, columns: Sequence[str], rows: int, in_degrees: bool, kind
 def _lines(
     times: Iterable[float], rows: Iterable[Iterable[float]], size: int, columns: Sequence[str] = ()
 ) -> Iterator[str]:
-    """Yield lines of numbers, of which `size` make a value; those in named columns must be finite."""
+    """Yield lines of numbers, `size` per value; numbers of named columns must be finite."""
     for time, row in zip(times, rows, strict=True):
         if columns and not np.isfinite(values := np.array([*row], dtype=float)).all():
             labels = columns if size == 1 else [column for column in columns for _ in range(size)]

@@ -116,7 +116,7 @@ def _overridden(analysis: JointReaction, motion: Motion, tables: Tables) -> tupl
         )
         return motion, None
     model.controller_set.objects.clear()
-    # Nobody asks for probes here, and those of muscles would miss what is replaced below.
+    # Probes are not needed here, and those of muscles would miss the forces that are replaced below.
     model.probe_set.objects.clear()
     places = {id(force): number for number, force in enumerate(model.force_set.objects)}
     for item in actuators:

@@ -168,9 +168,12 @@ class Rates(NamedTuple):
     note: str = ""  # what is said of them beside the muscle
 
 
-RISE_TO_63_PERCENT, FALL_TO_37_PERCENT = 1.052, 0.715
-"""Times, over MuJoCo's time constants, in which full excitation raises an activation from 0 to 1 - 1/e, and none lets
-it fall from 1 to 1/e: the integrals of (0.5 + 1.5 a) / (1 - a) and of 1 / (a (0.5 + 1.5 a))."""
+RISE_TO_63_PERCENT = 1.052
+"""Time in units of MuJoCo's activation time constant in which full excitation raises the activation from 0 to 1 - 1/e:
+the integral of (0.5 + 1.5 a) / (1 - a)."""
+FALL_TO_37_PERCENT = 0.715
+"""Time in units of MuJoCo's deactivation time constant in which the activation falls from 1 to 1/e without excitation:
+the integral of 1 / (a (0.5 + 1.5 a))."""
 
 
 def _read_rates(force: Muscle) -> Rates:
