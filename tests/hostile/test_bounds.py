@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from osimlite.errors import OsimliteError
+import osimlite
+from osimlite.errors import OsimliteError, SimulationError
 
 
 @pytest.mark.parametrize("bounds", ["-inf", "-inf -inf", "inf", "inf inf"])
@@ -21,3 +23,20 @@ def test_infinite_bounds_leave_no_value(bounds: str, fixtures: Path, tmp_path: P
     (tmp_path / "slide.omoco").write_text(text)
     with pytest.raises(OsimliteError):
         osimlite.moco.solve(tmp_path / "slide.omoco")
+
+
+def test_forces_that_are_no_numbers_are_no_result(fixtures: Path) -> None:
+    """The library refuses them as the command does."""
+    model = osimlite.read(fixtures / "pipelines" / "pendulum" / "model.osim")
+    motion = {
+        coordinate.name: [0.01 * k * k for k in range(12)] for coordinate in model.components(osimlite.Coordinate)
+    }
+    times = [0.1 * k for k in range(12)]
+    osimlite.inverse_dynamics(model, motion, times=times)
+    for body in model.components(osimlite.Body):
+        body.mass_center = (1e308, 0.0, 0.0)
+    with (
+        np.errstate(all="ignore"),
+        pytest.raises(SimulationError, match=r"Generalized Forces is (nan|inf|-inf)"),
+    ):
+        osimlite.inverse_dynamics(model, motion, times=times)

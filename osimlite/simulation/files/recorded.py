@@ -23,7 +23,7 @@ from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
 from osimlite.schema.tree import is_a
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.simulation.files.storage import StoTable, expect_numbers, read_sto
 from osimlite.simulation.lowpass import lowpassed
 from osimlite.simulation.movement import Movement
 from osimlite.simulation.start import columns_of_states
@@ -301,7 +301,7 @@ class RecordedMotion(Movement):
             forces: of the mechanism: springs, contacts, measured loads; their own states are where they start.
 
         Raises:
-            SimulationError: a force cannot be computed at one of the states.
+            SimulationError: a force cannot be computed at one of the states, or a result is NaN or infinite.
         """
         mechanism = self.mechanism
         system = System(mechanism.released(), forces or Forces(()))
@@ -317,7 +317,9 @@ class RecordedMotion(Movement):
         order = [place for body in mechanism.bodies for place in body.mobilizer.coordinates]
         infos = [mechanism.coordinates[place] for place in order]
         labels = [f"{info.name}_{'moment' if info.motion_type == 'rotational' else 'force'}" for info in infos]
-        return StoTable("Inverse Dynamics Generalized Forces", self.times, tuple(labels), rows[:, order])
+        name = "Inverse Dynamics Generalized Forces"
+        expect_numbers(name, labels, self.times, rows[:, order])
+        return StoTable(name, self.times, tuple(labels), rows[:, order])
 
 
 Recorded: TypeAlias = "str | Path | Mapping[str, ArrayLike] | Movement | Trajectory"
