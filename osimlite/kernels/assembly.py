@@ -17,12 +17,12 @@ from osimlite.kernels.layout import CONSTRAINED, MODEL, OUTCOME, STAGE, WORK
 from osimlite.kernels.least_squares import (
     REDUNDANT,
     ROUNDING,
-    apply_q,
     cholesky,
     factor_room,
     factorise,
     minimum_norm,
     substitute,
+    write_null_space,
 )
 from osimlite.kernels.pointers import Floats, Ints, at, call
 from osimlite.kernels.projection import position_errors, rows_by_values
@@ -173,16 +173,16 @@ def find_nearest(a: Assembly, wanted: Floats, q: Floats) -> bool:
         return False
     if is_assembled:
         return True
-    before, is_bent, step = inf, False, at(a.w, size)
+    before, has_curvature, step = inf, False, at(a.w, size)
     for _ in range(MAX_STEPS):
         value = measure_change(a, wanted, q)
         if value < tolerance * tolerance:
             # Nothing that counts has moved.
             return True
-        length = find_step(a, wanted, q, is_bent)
-        if not is_bent and length > FAST * before:
-            is_bent = True
-            length = find_step(a, wanted, q, is_bent)
+        length = find_step(a, wanted, q, has_curvature)
+        if not has_curvature and length > FAST * before:
+            has_curvature = True
+            length = find_step(a, wanted, q, has_curvature)
         furthest = 1.0
         for k in range(size):
             furthest = max(furthest, 1.0 + abs(q[k]))
@@ -201,9 +201,9 @@ def find_nearest(a: Assembly, wanted: Floats, q: Floats) -> bool:
                 break
         if part < 1e-3:
             # Nothing is nearer within rounding, or the step without the curvature led astray.
-            if is_bent:
+            if has_curvature:
                 return True
-            is_bent, before = True, inf
+            has_curvature, before = True, inf
         else:
             copy(size, trial, q)
             before = length if part == 1.0 else inf
@@ -321,7 +321,7 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
             if not is_assembled and counted[places[k]] == 0:
                 step[k] *= EASE
             furthest = max(furthest, abs(step[k]))
-        # Far away the equations say little about where to go; small steps, even to worse places, find out.
+        # Far from a solution the linearization is poor: take short steps, even where errors grow.
         copy(size, q, trial)
         for k in range(free):
             trial[places[k]] += LONGEST_STEP / furthest * step[k]
@@ -333,10 +333,17 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
     return largest <= tolerance
 
 
-def find_step(a: Assembly, wanted: Floats, q: Floats, is_bent: bool) -> float:
-    """Find Newton's step along the equations, for all degrees of freedom; return the largest change of one.
+def find_step(a: Assembly, wanted: Floats, q: Floats, has_curvature: bool) -> float:
+    """Find Newton's step in the null space of the linearized equations.
 
-    The curvature is that of the change, and if it is to be bent, of the equations times their multipliers.
+    Args:
+        a: the assembly; its work vector gets the step of every degree of freedom (rad or m).
+        wanted: desired values of the coordinates (n,).
+        q: present values (n,).
+        has_curvature: whether the Hessian contains the equations times their multipliers, besides the cost.
+
+    Returns:
+        The largest change of a coordinate (rad or m).
     """
     size, count = a.model[MODEL.DOFS], count_equations(a)
     held, factor, step = at(a.p, ASSEMBLY_HEAD), factor_of(a), at(a.w, size)
@@ -349,12 +356,7 @@ def find_step(a: Assembly, wanted: Floats, q: Floats, is_bent: bool) -> float:
     curvature, spare = at(along, size * size), at(along, 2 * size * size)
     for k in range(free):
         gradient[k] = q[places[k]] - wanted[places[k]] if counted[places[k]] > 0 else 0.0
-    for k in range(left):
-        direction = at(along, free * k)
-        for j in range(free):
-            direction[j] = 0.0
-        direction[rank + k] = 1.0
-        apply_q(free, factor, rank, direction)
+    write_null_space(free, factor, rank, along)
     for k in range(left):
         for m in range(left):
             total = 0.0
@@ -362,19 +364,19 @@ def find_step(a: Assembly, wanted: Floats, q: Floats, is_bent: bool) -> float:
                 if counted[places[j]] > 0:
                     total += along[free * k + j] * along[free * m + j]
             curvature[left * k + m] = total
-    if is_bent:
-        bend_curvature(a, q, free, left, along, curvature)
-    # The slopes are the right sides, then the lengths of the steps along the directions.
+    if has_curvature:
+        add_curvature(a, q, free, left, along, curvature)
+    # The negative gradient in the null space, replaced by the solution of the linear system.
     lengths = at(a.w, 6 * size)
     for k in range(left):
         lengths[k] = 0.0
         for j in range(free):
             lengths[k] -= along[free * k + j] * gradient[j]
     copy(left * left, curvature, spare)
-    is_bowl = cholesky(left, spare, 0.0)
+    is_convex = cholesky(left, spare, 0.0)
     for k in range(left):
-        is_bowl = is_bowl and spare[left * k + k] * spare[left * k + k] > SAFE
-    if is_bowl:
+        is_convex = is_convex and spare[left * k + k] * spare[left * k + k] > SAFE
+    if is_convex:
         substitute(left, spare, lengths)
     else:
         step_downhill(left, curvature, spare, at(spare, size * size), lengths)
@@ -390,8 +392,8 @@ def find_step(a: Assembly, wanted: Floats, q: Floats, is_bent: bool) -> float:
     return largest
 
 
-def bend_curvature(a: Assembly, q: Floats, free: int, left: int, along: Floats, curvature: Floats) -> None:
-    """Add what the curvature of the equations contributes, each times its multiplier, by central differences."""
+def add_curvature(a: Assembly, q: Floats, free: int, left: int, along: Floats, curvature: Floats) -> None:
+    """Add the second derivatives of the equations times their multipliers, by central differences."""
     size, count = a.model[MODEL.DOFS], count_equations(a)
     factor, gradient = factor_of(a), at(a.w, 5 * size)
     rows, lengths, multipliers = rows_of(a), at(a.w, 7 * size + count), at(a.w, 7 * size + 2 * count)

@@ -179,6 +179,23 @@ def apply_q(size: int, a: Floats, rank: int, x: Floats) -> None:
         reflect(r, size, 1, at(a, size * r), 1, x)
 
 
+def write_null_space(size: int, a: Floats, rank: int, basis: Floats) -> None:
+    """Write an orthonormal basis of the null space of factorised equations, by rows (size - rank, size).
+
+    Args:
+        size: number of unknowns.
+        a: the equations as `factorise` leaves them.
+        rank: their rank.
+        basis: the vectors of the basis, one after the other.
+    """
+    for k in range(size - rank):
+        direction = at(basis, size * k)
+        for j in range(size):
+            direction[j] = 0.0
+        direction[rank + k] = 1.0
+        apply_q(size, a, rank, direction)
+
+
 def cholesky(size: int, a: Floats, smallest: float) -> bool:
     """Factorise a symmetric matrix (size, size), of which the lower triangle counts, in its place.
 

@@ -7,7 +7,7 @@ Optimization, 2006, chapters 16.2 and 16.7).
 from __future__ import annotations
 
 from osimlite.kernels.layout import MODEL
-from osimlite.kernels.least_squares import apply_q, cholesky, factorise, minimum_norm, substitute
+from osimlite.kernels.least_squares import cholesky, factorise, minimum_norm, substitute, write_null_space
 from osimlite.kernels.pointers import Floats, at
 from osimlite.kernels.pose_cost import equations_of
 from osimlite.kernels.pose_record import (
@@ -145,13 +145,7 @@ def solve_along(m: Fit, free: int, place: int, smallest: float) -> int:
     rank = factorise(count, free, factor, REDUNDANT * count)
     minimum_norm(count, free, factor, rank, right, room, across)
     left = free - rank
-    for k in range(left):
-        # In the directions' row first the direction, then what the matrix makes of it.
-        row = at(directions, free * k)
-        for j in range(free):
-            row[j] = 0.0
-        row[rank + k] = 1.0
-        apply_q(free, factor, rank, row)
+    write_null_space(free, factor, rank, directions)
     for k in range(free):
         for j in range(free):
             solution[k] -= matrix[free * k + j] * across[j]
