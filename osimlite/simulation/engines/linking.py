@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache
@@ -22,8 +21,6 @@ from osimlite.simulation.engines import machine_code
 from osimlite.simulation.engines.carrying import DualVector, carried_by
 from osimlite.simulation.interrupts import defer_sigint
 from osimlite.simulation.pack import Packed
-
-_log = logging.getLogger(__name__)
 
 KERNEL = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 5, ctypes.c_int64)
 """A kernel: takes the three vectors, a state, room for its derivative, and the place of an item."""
@@ -257,7 +254,12 @@ def best() -> Code:
 def warn_of_python(reason: str = "") -> None:
     """Warn that kernels run as Python, once for each reason."""
     if machine_code.allows(machine_code.LIBRARY) or reason:
-        _log.warning("%s (%s)", machine_code.PYTHON_COST, reason or "; ".join(machine_code.explain_source()))
+        # Imported here, since it takes five milliseconds and hardly anybody is warned.
+        import logging
+
+        logging.getLogger(__name__).warning(
+            "%s (%s)", machine_code.PYTHON_COST, reason or "; ".join(machine_code.explain_source())
+        )
 
 
 class Program:

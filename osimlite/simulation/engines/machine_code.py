@@ -103,10 +103,11 @@ def make_ready(names: Sequence[str]) -> None:
 
 def can_prepare(names: Iterable[str]) -> bool:
     """Return whether all laws are at hand, or there is something to compile them with."""
-    if allows(COMPILER) and find_compiler() is not None:
-        return True
+    # The compiler is looked for last: to ask it for its version takes longer than all of a short simulation.
     missing = [name for name in names if not is_at_hand(name)]
     if not missing:
+        return True
+    if allows(COMPILER) and find_compiler() is not None:
         return True
     has_duals = any(law_of(name)[1] for name in missing)
     return not has_duals and allows(NUMBA) and _has_numba()

@@ -8,10 +8,10 @@ from __future__ import annotations
 import io
 import json
 import os
-import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from osimlite.errors import DocumentError, MissingDependency
 from osimlite.files import read_file
 from osimlite.multibody.spatial import Array
 from osimlite.simulation.files.storage import StoTable
+
+if TYPE_CHECKING:
+    import subprocess
 
 ENDING = ".c3d"
 
@@ -83,6 +86,9 @@ def _read_apart(path: str | Path, what: str) -> dict[str, Array]:
             file=str(path),
         )
     seconds = SECONDS + size // BYTES_PER_SECOND
+    # Imported here, since every tool knows of these files and few have one.
+    import subprocess
+
     package = str(Path(__file__).parents[3])
     command = [sys.executable, "-P", "-c", PROGRAM, what, os.path.abspath(path), str(seconds), package]
     try:

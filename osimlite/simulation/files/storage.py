@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from array import array
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -104,6 +102,10 @@ def write_sto(
         OsimliteError: the file cannot be written.
         UnsupportedError: OpenSim does not know the kind.
     """
+    # Imported here, since many read tables and write none.
+    import shutil
+    import tempfile
+
     # How many rows there are stands before them.
     with tempfile.TemporaryFile("w+b") as body:
         count = 0

@@ -100,6 +100,17 @@ def test_one_source_can_be_asked_for(sources, only, address):
         assert machine_code.address_of("evaluate") == address
 
 
+def test_no_compiler_is_looked_for_where_the_library_has_all(sources):
+    """To ask a compiler for its version takes longer than a short simulation."""
+
+    def find():
+        raise AssertionError("the compiler was asked for")
+
+    add_library(sources)
+    sources.setattr(machine_code, "find_compiler", find)
+    assert machine_code.can_prepare(["evaluate"])
+
+
 def test_an_unknown_source_is_refused(sources):
     sources.setenv(machine_code.VARIABLE, "compilr")
     with pytest.raises(OsimliteError, match=r"OSIMLITE_KERNELS is 'compilr'.*compiler"):
