@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any, ClassVar
 
 from osimlite.text import brief, visible
@@ -81,7 +83,33 @@ class ModelError(OsimliteError):
 
 
 class MissingNameError(ModelError, AttributeError):
-    """A component has no property or member of that name."""
+    """A component has no property or member of that name.
+
+    Args:
+        describe: returns the message. It is called when somebody reads the message: to find the nearest name takes
+            milliseconds, and `hasattr` and `getattr` with a default drop the error unread.
+    """
+
+    def __init__(self, describe: Callable[[], str]) -> None:
+        super().__init__("")
+        self._describe = describe
+        # The property below takes the place of this.
+        del self.message
+
+    @cached_property
+    def message(self) -> str:  # type: ignore[override]
+        """The sentence that says which name is missing."""
+        return brief(self._describe())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Functions do not pass from one process to another, sentences do.
+        place = {"file": self.file, "line": self.line, "column": self.column}
+        return _restore_missing_name, (type(self), self.message), place
+
+
+def _restore_missing_name(cls: type[MissingNameError], message: str) -> MissingNameError:
+    """Return the error with a message that is known."""
+    return cls(lambda: message)
 
 
 class SimulationError(OsimliteError):

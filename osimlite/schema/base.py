@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Iterator
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeVar, cast, dataclass_transform, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -102,7 +102,7 @@ class Object(BaseModel, metaclass=ObjectType):
         for given in properties.keys() - type(self).model_fields.keys():
             spec = field_specs(type(self)).get(given)
             if spec is None or spec.name in properties:
-                raise MissingNameError(misspelt(type(self), given))
+                raise MissingNameError(partial(misspelt, type(self), given))
             properties[spec.name] = properties.pop(given)
         try:
             super().__init__(**properties)
@@ -194,14 +194,14 @@ class Object(BaseModel, metaclass=ObjectType):
             spec = field_specs(type(self)).get(name)
             if spec is not None:
                 return getattr(self, spec.name)
-            raise MissingNameError(misspelt(type(self), name))
+            raise MissingNameError(partial(misspelt, type(self), name))
         raise AttributeError(name)
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in type(self).model_fields:
             spec = field_specs(type(self)).get(name)
             if spec is None:
-                raise MissingNameError(misspelt(type(self), name))
+                raise MissingNameError(partial(misspelt, type(self), name))
             name = spec.name
         note_change(self._model, numbers_only=name in numeric_names(type(self)))
         try:

@@ -162,6 +162,26 @@ def test_a_socket_is_known_by_the_middle_of_its_name(cls, given, meant):
         CLASSES[cls](**{given: "/ground"})
 
 
+def test_nearest_names_are_looked_for_only_if_the_message_is_read(monkeypatch):
+    """`hasattr` and `getattr` with a default drop the error unread."""
+    asked = []
+    monkeypatch.setattr("osimlite.schema.base.misspelt", lambda cls, name: asked.append(name) or f"no '{name}'")
+    body = CLASSES["Body"](name="b")
+    assert not hasattr(body, "geometry_path") and getattr(body, "masss", None) is None
+    assert not asked
+    with pytest.raises(MissingNameError, match="no 'masss'"):
+        body.masss  # noqa: B018
+    assert asked == ["masss"]
+
+
+def test_a_missing_name_passes_to_other_processes():
+    with pytest.raises(MissingNameError) as caught:
+        CLASSES["Body"](name="b").masss  # noqa: B018
+    caught.value.file, caught.value.line = "a.osim", 3
+    other = pickle.loads(pickle.dumps(caught.value))
+    assert str(other) == str(caught.value) == "a.osim:3: Body has no property 'masss'; did you mean 'mass'?"
+
+
 def test_a_list_where_a_set_belongs_is_told_how_to_make_the_set():
     with pytest.raises(ModelError, match=r"write HuntCrossleyForce\.ContactParametersSet\(objects=\[\.\.\.\]\)"):
         CLASSES["HuntCrossleyForce"](contact_parameters=[CLASSES["HuntCrossleyContactParameters"]()])
