@@ -102,7 +102,7 @@ def real_model(corpus: Any, name: str, folder: Path) -> osimlite.Model:
 def write_orientations(path: Path, times: Sequence[float], names: Sequence[str], rotations: Any) -> None:
     """Rotation matrices (t, k, 3, 3) as a table of quaternions."""
     rows = quaternion(rotations).reshape(len(times), -1).tolist()
-    write_sto(path, "orientations", times, names, rows, kind="Quaternion")
+    write_sto(path, "orientations", times, names, rows, kind="Quaternion", has_missing=True)
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,7 @@ def test_markers_controls_and_bounds_over_time(tmp_path):
         "of_tip": np.where(t == 0, 0.9, np.nan),
     }
     guess = tmp_path / "guess.sto"
-    write_sto(guess, "", t, tuple(columns), np.column_stack([*columns.values()]))
+    write_sto(guess, "", t, tuple(columns), np.column_stack([*columns.values()]), has_missing=True)
     counts = (
         "num_controls=2\nnum_derivatives=0\nnum_input_controls=0\nnum_multipliers=0\nnum_parameters=2\nnum_slacks=0\n"
     )

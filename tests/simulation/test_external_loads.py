@@ -44,7 +44,7 @@ def force(**tags: str) -> str:
 
 
 def data(folder: Path, rows: np.ndarray, times=(0.0, 1.0)) -> None:
-    write_sto(folder / "grf.mot", "grf", times, LABELS, rows.tolist())
+    write_sto(folder / "grf.mot", "grf", times, LABELS, rows.tolist(), has_missing=True)
 
 
 def test_the_same_as_a_prescribed_force(model, tmp_path):

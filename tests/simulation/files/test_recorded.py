@@ -102,7 +102,9 @@ def test_what_is_no_motion_is_refused(arm, tmp_path: Path):
     write_sto(path, "motion", [0.0, 0.2, 0.1], ("elbow_0",), [[1.0], [2.0], [3.0]])
     with pytest.raises(DocumentError, match=r"the time 0\.1 does not come after 0\.2"):
         RecordedMotion.read(arm, path)
-    write_sto(path, "motion", [0.0, 0.1], ("emg", "elbow_0"), [[float("nan"), 1.0], [0.0, float("nan")]])
+    write_sto(
+        path, "motion", [0.0, 0.1], ("emg", "elbow_0"), [[float("nan"), 1.0], [0.0, float("nan")]], has_missing=True
+    )
     with pytest.raises(DocumentError, match=r"'elbow_0' is nan at 0\.1 s; fill the gaps"):
         RecordedMotion.read(arm, path)
     write_sto(path, "motion", [0.0, 0.1, 0.2], ("elbow_0",), [[1.0], [2.0], [3.0]])
