@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.quick_cases import QUICK_CASES
+from tests.quick_cases import QUICK_CASES, QUICK_STRIDES
 
 HOW = "`pytest --full` runs them"
 _ANSWER = "tests_of_the_full_suite"
@@ -79,8 +79,12 @@ def _mark_cases(config: pytest.Config, items: list[pytest.Item]) -> None:
         UsageError: a case that it should take does not exist.
     """
     seen: dict[str, set[str]] = {}
+    counts: dict[str, int] = {}
     for item in items:
         function, _, case = item.nodeid.partition("[")
+        counts[function] = counts.get(function, -1) + 1
+        if counts[function] % QUICK_STRIDES.get(function, 1):
+            item.add_marker("full")
         if function in QUICK_CASES:
             seen.setdefault(function, set()).add(case.removesuffix("]"))
             if case.removesuffix("]") not in QUICK_CASES[function]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -34,21 +37,28 @@ EXPORTER = Exporter("names", "translate", "a list of bodies", write, (Choice("en
 '''
 
 
+@pytest.fixture(autouse=True)
+def forget() -> Iterator[None]:
+    """Let the exporters be looked up anew, in the test and after it."""
+    forget_exporters()
+    yield
+    forget_exporters()
+
+
+def forget_exporters() -> None:
+    exporters.exporters.cache_clear()
+    # The command takes its options from the exporters when its module is imported.
+    sys.modules.pop("osimlite.cli.translate", None)
+
+
 @pytest.fixture
 def names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     more = tmp_path / "more"
     more.mkdir()
     (more / "names.py").write_text(NAMES)
     monkeypatch.setattr(exporters, "__path__", [*exporters.__path__, str(more)])
-    exporters.exporters.cache_clear()
     monkeypatch.chdir(tmp_path)
     write(dynamic_walker(), "walker.osim")
-
-
-@pytest.fixture(autouse=True)
-def forget() -> object:
-    yield
-    exporters.exporters.cache_clear()
 
 
 def call(*words: str) -> int:
@@ -71,9 +81,6 @@ def test_a_new_exporter_is_one_file(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_exporters_are_told_without_what_they_work_with() -> None:
-    import subprocess
-    import sys
-
     code = "import sys; from osimlite.exporters import exporters as e; e('view'), e('translate'); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not set(done.stdout.split()) & {"numpy", "lxml", "pydantic", "osimlite.view.shown", "osimlite.translate"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from osimlite.tables import MarkerHeader, StorageHeader
+from tests.suite import choose
 
 
 def test_what_a_storage_file_says():
@@ -47,7 +48,7 @@ def test_what_a_marker_file_says():
 @pytest.mark.parametrize("part", [b" ", b"\t", b"\n", b"a", b"a ", b"a\t", b"=", b"\r", b"\xff"])
 def test_long_headers_are_read_in_time_that_grows_with_them(part):
     """A pattern that tries every beginning again would not come to an end."""
-    long = part * 300_000
+    long = part * choose(50_000, 300_000)
     for start in (b"", b"a=b", b"t\nendheader\n", b"t\nendheader\ntime\t"):
         StorageHeader(start + long + b"x\n")
     MarkerHeader(b"P\n" + b"\n".join([long] * 4))

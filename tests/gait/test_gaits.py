@@ -48,6 +48,7 @@ def found(tmp_path_factory):
     return gait, folder, stages
 
 
+@pytest.mark.full
 def test_a_walker_is_found_that_never_stops(found):
     gait, folder, stages = found
     assert gait.found.cycle.residual < 1e-9 and gait.found.cycle.largest < 1.0
@@ -134,6 +135,7 @@ def test_what_cannot_be_searched_leaves_no_folder(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
+@pytest.mark.full
 def test_more_of_them_walk_where_a_cycle_costs_less():
     """Below what is stable enough, the cost is less by the part that walks."""
     search = CycleSearch(plan(dynamic_walker(), NEAR), stable=1.0, perturb=0.02)

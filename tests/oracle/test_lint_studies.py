@@ -11,6 +11,7 @@ import pytest
 
 from osimlite.lint import validate
 from tests.lint.setup_faults import FAULTS, SETUPS, STUDIES, Fault, put_in
+from tests.suite import choose
 
 pytest.importorskip("opensim")
 pytestmark = pytest.mark.oracle
@@ -34,7 +35,8 @@ for folder in sys.argv[1:]:
 
 
 def test_opensim_refuses_the_studies_with_errors(tmp_path: Path) -> None:
-    asked = [Fault("control", "slide.omoco", "", ""), *(fault for fault in CASES if fault.number not in ENDLESS)]
+    tried = [fault for fault in CASES if fault.number not in ENDLESS]
+    asked = [Fault("control", "slide.omoco", "", ""), *tried[:: choose(4, 1)]]
     for fault in asked:
         folder = tmp_path / str(fault.number)
         folder.mkdir()

@@ -306,6 +306,7 @@ def test_loads(kind, tmp_path):
     assert ours == pytest.approx(theirs, rel=1e-9)
 
 
+@pytest.mark.full
 def test_loads_of_a_motion_that_is_given(tmp_path):
     """Likewise, of joints and coordinates, with what the constraints push."""
     pytest.importorskip("opensim")
@@ -360,6 +361,7 @@ print(json.dumps([terms, violations(program, w, rows)[0].size, found.violations[
     ("scheme", "mode"),
     [("trapezoidal", "explicit"), ("hermite-simpson", "implicit")],
 )
+@pytest.mark.full
 def test_states_that_are_moved_onto_constraints(scheme, mode, tmp_path):
     """By Bordalba 2023: Moco's solution has its costs here and violates nothing, and ours costs no more."""
     pytest.importorskip("opensim")

@@ -8,7 +8,7 @@ from math import pi
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import osimlite
@@ -16,6 +16,7 @@ from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, Coordina
 from osimlite.errors import SimulationError
 from osimlite.multibody import build_mechanism
 from osimlite.simulation.elements import Forces, force_elements
+from tests.suite import choose
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
@@ -188,6 +189,7 @@ def test_limit_of_an_angle_of_a_ball_joint_acts_on_its_speed(route):
     assert within(ours, mechanism.acceleration(q, u, {"q0_1": row["limit"]}))
 
 
+@settings(max_examples=choose(20, 100))
 @given(
     seed=st.integers(0, 10**6),
     lengths=st.lists(st.sampled_from(["PinJoint", "UniversalJoint"]), min_size=1, max_size=12),

@@ -13,6 +13,7 @@ import osimlite
 from osimlite import to_text
 from osimlite.errors import ModelError, OsimliteError, SettingError, SimulationError
 from tests.simulation.force_cases import FORCES, with_force
+from tests.suite import choose
 
 NUMBERS = re.compile(r"<(\w+)>([-+0-9.eE \n\t]*\d[-+0-9.eE \n\t]*)</\1>")
 EXTREMES = (
@@ -97,7 +98,7 @@ def test_a_fixed_step_that_never_arrives_is_refused(engine, step):
         osimlite.simulate(pendulum(osimlite.PinJoint), 1.0, engine, fixed_step=step)
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=choose(5, 15), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 def test_any_number_gets_one_verdict(data):
     name = data.draw(st.sampled_from(sorted(FORCES)))

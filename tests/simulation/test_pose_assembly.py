@@ -22,6 +22,7 @@ from osimlite.simulation.files.recorded import RecordedMotion
 from osimlite.simulation.pose_assembly import assemble_motion
 from tests.multibody.strategies import KINDS, Case, cases, constraint_of
 from tests.simulation.checked import Checked
+from tests.suite import choose
 
 
 def change_of(mechanism: Mechanism, poses: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -38,11 +39,13 @@ def compare(mechanism: Mechanism, wanted: np.ndarray, code: Code = COMPILED, acc
         state = mechanism.at(q, time=0.7)
         errors = np.concatenate([item.position_errors(state) for item in mechanism.constraints])
         assert np.abs(errors).max(initial=0.0) <= tolerance_of(mechanism)
-    assert change_of(mechanism, result, wanted) == pytest.approx(change_of(mechanism, known, wanted), abs=1e-12)
+    least, change = change_of(mechanism, known, wanted), change_of(mechanism, result, wanted)
+    # A pose that is off by `accuracy` across the equations changes the squared distance to first order.
+    assert (np.abs(change - least) <= 1e-12 + 2.0 * np.sqrt(least) * accuracy).all()
     assert np.abs(result - known).max() < accuracy
 
 
-@settings(max_examples=80)
+@settings(max_examples=choose(20, 80))
 @given(
     cases(max_bodies=4),
     st.sampled_from(KINDS),

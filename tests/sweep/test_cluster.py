@@ -114,6 +114,7 @@ def command(cluster, folder, *words):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="sends signals")
+@pytest.mark.full
 def test_workers_and_coordinator_are_killed_and_nothing_is_lost(cluster, tmp_path, walker, monkeypatch):
     monkeypatch.syspath_prepend(str(cluster.folder))
     osimlite.write(walker, tmp_path / "walker.osim")

@@ -83,6 +83,7 @@ def test_each_waits_for_what_it_needs_and_workers_change_no_byte(trials: Path) -
     assert {item["status"] for item in told} == {"done"} and told[3]["summary"]["rms_marker_error"] < 1e-8
 
 
+@pytest.mark.full
 def test_a_failure_stops_only_what_needs_it_and_is_mended_by_resuming(trials: Path) -> None:
     file = trials / "trial1" / "trial.trc"
     whole = file.read_text()

@@ -34,6 +34,7 @@ for path in sys.argv[1:]:
 """
 
 
+@pytest.mark.full
 def test_both_versions_of_mujoco_have_the_same_bodies(older, corpus, tmp_path):
     chosen = [item for item in corpus if item.id in ("m0113", "m0163", "m0168", "m0187", "m0466")]
     files = []
