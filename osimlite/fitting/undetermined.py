@@ -51,8 +51,9 @@ def find_undetermined(
     held = [k for k, info in enumerate(mechanism.coordinates) if info.locked or info.prescribed is not None]
     held += [goal.coordinate for goal in goals if goal.weight > 0.0]
     open_everywhere = np.ones(count, dtype=bool)
-    frames = np.unique(np.linspace(0, len(values) - 1, min(len(values), MOST_FRAMES)).astype(int))
-    for frame in frames.tolist():
+    frames = np.linspace(0, len(values) - 1, min(len(values), MOST_FRAMES)).astype(int)
+    # `np.unique` would import `numpy.ma`, which takes ten milliseconds.
+    for frame in sorted(set(frames.tolist())):
         state = mechanism.at(values[frame])
         rows = [np.eye(count)[held]]
         for marker, is_seen in zip(markers, seen[frame].tolist(), strict=True):

@@ -15,7 +15,7 @@ from osimlite.schema.equality import same
 from osimlite.schema.facts import Contradiction, Facts
 from osimlite.schema.fields import Many, ObjectList, Reference, Tag, note_change
 from osimlite.schema.layout import Home, Layout
-from osimlite.schema.specs import FieldSpec, defaults, field_specs, holding, numeric_names
+from osimlite.schema.specs import FieldSpec, checks, defaults, field_specs, holding, numeric_names
 
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass
@@ -104,6 +104,10 @@ class Object(BaseModel, metaclass=ObjectType):
             if spec is None or spec.name in properties:
                 raise MissingNameError(partial(misspelt, type(self), given))
             properties[spec.name] = properties.pop(given)
+        values = _check_values(type(self), properties)
+        if values is not None:
+            self._fill(values, set(properties))
+            return
         try:
             super().__init__(**properties)
         except ValidationError as error:
@@ -121,10 +125,17 @@ class Object(BaseModel, metaclass=ObjectType):
         `values` may leave out properties, `present` names those the text gave; the rest take their defaults. This is
         the reader's way in, several times faster than ``cls(...)`` and tested to be equal to it.
         """
-        # Default objects and lists are made when someone asks for them, see `__getattr__`: most are never asked for.
-        state = defaults(cls)[0].copy()
-        state.update(values)
         self = _new(cls)
+        self._fill(values, present, index, home)
+        return self
+
+    def _fill(
+        self, values: dict[str, Any], present: set[str], index: int | None = None, home: Home | None = None
+    ) -> None:
+        """Put values of the stored form into a new instance; the arguments are those of `build`."""
+        # Default objects and lists are made when someone asks for them, see `__getattr__`: most are never asked for.
+        state = defaults(type(self))[0].copy()
+        state.update(values)
         _put_state(self, state)
         _put_present(self, present)
         _put_extra(self, None)
@@ -132,7 +143,6 @@ class Object(BaseModel, metaclass=ObjectType):
         put_model(self, home)
         put_index(self, index)
         _put_layout(self, None)
-        return self
 
     @classmethod
     def model_construct(cls, _fields_set: set[str] | None = None, **values: Any) -> Self:
@@ -204,6 +214,11 @@ class Object(BaseModel, metaclass=ObjectType):
                 raise MissingNameError(partial(misspelt, type(self), name))
             name = spec.name
         note_change(self._model, numbers_only=name in numeric_names(type(self)))
+        values = _check_values(type(self), {name: value})
+        if values is not None:
+            self.__dict__.update(values)
+            self.model_fields_set.add(name)
+            return
         try:
             super().__setattr__(name, value)
         except ValidationError as error:
@@ -340,6 +355,17 @@ for _base in (Object, Component):
     _base.__annotations__ = {name: _hints[name] for name in _base.__annotations__ if name in _base.model_fields}
 
 _set = object.__setattr__
+
+
+def _check_values(cls: type[Object], properties: dict[str, Any]) -> dict[str, Any] | None:
+    """Return properties in the form that is stored; None if pydantic has to look at them, or to say what is wrong."""
+    known = checks(cls)
+    if known is None or not properties.keys() <= known.keys():
+        return None
+    try:
+        return {name: known[name](value) for name, value in properties.items()}
+    except ValueError:
+        return None
 
 
 _NAMING = -1

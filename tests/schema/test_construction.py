@@ -6,14 +6,16 @@ import copy
 import pickle
 import pydoc
 from importlib import import_module
+from typing import Annotated
 
+import numpy as np
 import pytest
-from pydantic import BaseModel
+from pydantic import BaseModel, field_validator
 
 import osimlite
 from osimlite.errors import MissingNameError, ModelError
 from osimlite.schema.base import Object, put_model
-from osimlite.schema.fields import Held, Reference, Value
+from osimlite.schema.fields import Held, Integer, Number, Reference, Value, Vec3, vec3
 from osimlite.schema.model import Model
 from osimlite.schema.registry import MODULES
 from osimlite.schema.specs import defaults, field_specs
@@ -123,6 +125,41 @@ def test_every_property_can_be_given_by_its_tag(cls: type[Object]) -> None:
         assert not tree.is_current
         if not hasattr(cls, spec.tag):
             assert getattr(other, spec.tag) is getattr(other, spec.name)
+
+
+def test_no_validator_is_built_for_values_that_are_right() -> None:
+    """To build pydantic's validator of a class takes milliseconds, and all its plug-ins are looked for."""
+
+    class Lamp(Object):
+        watts: Number = 40.0
+        place: Annotated[Vec3, vec3("m")] = (0.0, 0.0, 0.0)
+
+    lamp = Lamp(name="lamp", watts=np.float64(60.0))
+    lamp.place = [1, 2, 3]  # type: ignore[assignment]
+    assert (lamp.watts, type(lamp.watts), lamp.place) == (60.0, float, (1.0, 2.0, 3.0))
+    assert lamp.model_fields_set == {"name", "watts", "place"}
+    assert not Lamp.__pydantic_complete__
+    with pytest.raises(ModelError, match=r"^Lamp.watts: expected a number, got 'much'$"):
+        lamp.watts = "much"  # type: ignore[assignment]
+    assert lamp.watts == 60.0 and Lamp.__pydantic_complete__
+
+
+def test_a_class_with_validators_of_its_own_has_them_run() -> None:
+    class Even(Object):
+        count: Integer = 0
+
+        @field_validator("count")
+        @classmethod
+        def expect_even(cls, value: int) -> int:
+            if value % 2:
+                raise ValueError("expected an even number")
+            return value
+
+    even = Even(count=2)
+    with pytest.raises(ModelError, match="expected an even number"):
+        even.count = 3
+    with pytest.raises(ModelError, match="expected an even number"):
+        Even(count=1)
 
 
 def test_where_a_component_stands_and_the_path_of_a_muscle_are_two_things() -> None:

@@ -7,6 +7,7 @@ date by these rules would add what is there already in its new form: a second in
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import NamedTuple
 
 from lxml import etree
@@ -50,12 +51,15 @@ _MARKS = (
 def find_newer_content(root: Element, version: int) -> NewerContent | None:
     """Return the first element of a document that is newer than its version, or None."""
     for element in root.iter(etree.Element):
-        holder = as_written(element.tag)
-        for pattern, tags in _MARKS:
-            if not pattern.fullmatch(holder):
-                continue
+        for tags in _marks_of(element.tag):
             for child in element.iterchildren(etree.Element):
                 since = tags.get(as_written(child.tag), 0)
                 if version < since and (len(child) or (child.text or "").strip()):
-                    return NewerContent(child, holder, since)
+                    return NewerContent(child, as_written(element.tag), since)
     return None
+
+
+@lru_cache(maxsize=1000)
+def _marks_of(tag: str) -> list[dict[str, int]]:
+    """Return the properties to look for in elements of a tag; documents have thousands of elements of few tags."""
+    return [tags for pattern, tags in _MARKS if pattern.fullmatch(as_written(tag))]

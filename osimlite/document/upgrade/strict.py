@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from functools import cache
 from math import isfinite, isinf
 
 from osimlite.document.lexical import Unclean, real, split
@@ -133,14 +134,18 @@ def _is_whole(text: str) -> bool:
 
 
 def _is_vector(size: int) -> Callable[[str], bool]:
-    numbers = r"\s*,?\s*".join([f"({_NUMBER})"] * size).replace(r"\s*,?\s*", r"(?:\s*,\s*|\s+)")
-    pattern = re.compile(rf"{numbers}|~?\s*\[\s*{numbers}\s*\]|~?\s*\(\s*{numbers}\s*\)")
-
     def reads(text: str) -> bool:
-        result = pattern.fullmatch(text)
+        result = _vector_pattern(size).fullmatch(text)
         return result is not None and not any(number and isinf(float(number)) for number in result.groups())
 
     return reads
+
+
+@cache
+def _vector_pattern(size: int) -> re.Pattern[str]:
+    """Return the pattern of a vector; compiled at first use, since few documents need it and it takes a millisecond."""
+    numbers = r"\s*,?\s*".join([f"({_NUMBER})"] * size).replace(r"\s*,?\s*", r"(?:\s*,\s*|\s+)")
+    return re.compile(rf"{numbers}|~?\s*\[\s*{numbers}\s*\]|~?\s*\(\s*{numbers}\s*\)")
 
 
 _KINDS: dict[str, tuple[Callable[[str], bool], str]] = {
