@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 from osimlite._require import absent
 from osimlite.errors import OsimliteError
-from osimlite.lint.measures import NEEDS_SIM
+from osimlite.lint.measures import MECHANISM, NEEDS_SIM
 
 if TYPE_CHECKING:
     from osimlite.lint.subject import Subject
@@ -162,7 +162,8 @@ def _try_construction(subject: Subject) -> list[Obstacle]:
     try_construction = import_module("osimlite.measuring.construction").try_construction
     with lent(subject.tree):
         try:
-            result: list[Obstacle] = try_construction(subject.model, subject.folder)
+            result: list[Obstacle]
+            result, subject.kept[MECHANISM] = try_construction(subject.model, subject.folder)
         except (ArithmeticError, ValueError, OsimliteError) as error:
             # Other rules report numbers that are too large to compute with.
             result = [Obstacle(Stage.MECHANISM, "", str(getattr(error, "message", error)))]

@@ -18,6 +18,9 @@ from osimlite.text import listed
 if TYPE_CHECKING:
     from osimlite.lint.subject import Subject
 
+MECHANISM = "mechanism"
+"""Key of the mechanism that construction has built, kept with a subject until its paths and muscles are measured."""
+
 MEASURES = "measures"
 """What rules are about that need them."""
 
@@ -169,6 +172,7 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
     if missing:
         verb = "is" if len(missing) == 1 else "are"
         return f"{NEEDS_SIM} ({listed(missing)} {verb} not installed); run: pip install 'osimlite[sim]'"
+    mechanism = subject.kept.pop(MECHANISM, None)
     parts = parts_of(subject)
     known = None if parts is None else recall(parts, subject.kept_in)
     if parts is not None and known is not None:
@@ -183,7 +187,7 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
         assert subject.model is not None
         known_of = None if parts is None or known is None else (known.measures, known.of(parts))
         with lent(subject.tree):
-            result = measured(subject.model, compiles=compiles, known=known_of)
+            result = measured(subject.model, compiles=compiles, known=known_of, mechanism=mechanism)
     except NoMachineCodeError as error:
         subject.is_unsettled = True
         return error.message

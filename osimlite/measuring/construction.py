@@ -38,17 +38,22 @@ _QUOTED_PATH = re.compile(r"'(/[^']*)'")
 
 
 @np.errstate(all="ignore")
-def try_construction(model: Model, folder: Path | None = None) -> list[Obstacle]:
-    """Return what stops the computation of a model, in the order of the steps.
+def try_construction(model: Model, folder: Path | None = None) -> tuple[list[Obstacle], Mechanism | None]:
+    """Return what stops the computation of a model.
 
     Args:
         model: the model to build.
         folder: where its file is, and the files that it names; None for a model that is in no file.
+
+    Returns:
+        The obstacles in the order of the steps, and the mechanism for those who compute more of the model; None if it
+        has none.
     """
     with warnings.catch_warnings():
         # Rules report what a simulation only warns of.
         warnings.simplefilter("ignore", DoubtfulWarning)
-        return [*_Construction(model, folder).run()]
+        construction = _Construction(model, folder)
+        return [*construction.run()], construction.mechanism
 
 
 class _Construction:
@@ -58,10 +63,11 @@ class _Construction:
         self.model = model
         self.folder = Path(folder or ".")
         self.tree = model.tree()
+        self.mechanism: Mechanism | None = None
 
     def run(self) -> Iterator[Obstacle]:
         try:
-            mechanism = build_mechanism(self.model)
+            self.mechanism = mechanism = build_mechanism(self.model)
         except OsimliteError as error:
             yield self.describe(error, Stage.MECHANISM)
             return

@@ -37,7 +37,13 @@ MIDDLE = 0.5
 
 
 @np.errstate(all="ignore")
-def measured(model: Model, *, compiles: bool, known: tuple[Measures, Measures] | None = None) -> Measures:
+def measured(
+    model: Model,
+    *,
+    compiles: bool,
+    known: tuple[Measures, Measures] | None = None,
+    mechanism: Mechanism | None = None,
+) -> Measures:
     """Measure the paths and muscles of a model.
 
     Args:
@@ -45,6 +51,7 @@ def measured(model: Model, *, compiles: bool, known: tuple[Measures, Measures] |
         compiles: whether kernels that are in no library or file yet are compiled, which takes longer than to do
             without for a model that has few surfaces.
         known: what was measured when some paths were others, or not there, and all else as it is; and what still holds.
+        mechanism: of the model; made if left out.
 
     Raises:
         UnsupportedError: a path, a joint or a constraint cannot be computed.
@@ -56,7 +63,7 @@ def measured(model: Model, *, compiles: bool, known: tuple[Measures, Measures] |
     if compiles and not has_machine_code():
         raise NoMachineCodeError(NEEDS_MACHINE_CODE)
     code = None if compiles else AT_HAND
-    paths = Paths(model, code=code, left_out=still.swept if still is not None else ())
+    paths = Paths(model, code=code, left_out=still.swept if still is not None else (), mechanism=mechanism)
     has_surfaces = any(isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values())
     around = paths.around_surfaces(model, GEODESIC, code) if has_surfaces else None
     _expect_few_loops(paths.mechanism)
@@ -65,7 +72,7 @@ def measured(model: Model, *, compiles: bool, known: tuple[Measures, Measures] |
     looked_at = sweeps(paths, start, set() if still is None else swept_places(still))
     if before is not None and {sweep.place for sweep in looked_at} != swept_places(before):
         # All paths are looked at in the same poses.
-        return measured(model, compiles=compiles)
+        return measured(model, compiles=compiles, mechanism=mechanism)
     starts, reaches = [], []
     ends = dict(zip(paths.names, zip(default, _ends(looked_at, default), strict=True), strict=True))
     for fibers in fibers_of(model, paths.mechanism, ends):

@@ -112,7 +112,8 @@ def messages_of(text: str | bytes, folder: Path | None = None) -> list[str]:
         model = read_text(text)
     except OsimliteError:
         return []
-    return [obstacle.message for obstacle in construction.try_construction(model, folder)]
+    obstacles, _ = construction.try_construction(model, folder)
+    return [obstacle.message for obstacle in obstacles]
 
 
 def test_every_message_comes_from_a_model_or_has_a_reason_why_none_is_here():
