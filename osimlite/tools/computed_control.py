@@ -284,12 +284,21 @@ class ComputedControl:
     def _posed(self, t: float, z: Array) -> list[float]:
         """The state (y,) on the way that is foreseen."""
         if t not in self._poses:
-            q, u = np.add(self.desired.pose(t), self._corrections)
+            self._foresee([t], z)
+        return [*self._poses[t], *z.tolist()]
+
+    def _foresee(self, times: Sequence[float], z: Array) -> None:
+        """Find the poses of some times that are not known yet: the splines of several take as long as those of one."""
+        unknown = [t for t in times if t not in self._poses]
+        if not unknown:
+            return
+        values, speeds = self.desired.poses(unknown)
+        for t, *pose in zip(unknown, values, speeds, strict=True):
+            q, u = np.add(pose, self._corrections)
             y: list[float] = self.engine.state.pack(q.tolist(), u.tolist(), z.tolist())
             if self.simulation.constraints:
                 y = self.engine.projected(t, y, ASSEMBLED) or y
             self._poses[t] = y[: self._first]
-        return [*self._poses[t], *z.tolist()]
 
     def _aged(self, t: float, target: float, z: Array, controls: Array, *, held: bool = False) -> Array:
         """Auxiliary states at the end of a window, by Merson's method on the poses that are foreseen.
@@ -313,6 +322,8 @@ class ComputedControl:
         step, time = min(LONGEST, target - t), t
         while time < target:
             h = min(step, target - time)
+            if not held:
+                self._foresee((time, time + h / 3, time + h / 2, time + h), z)
             k1 = rate(time, z)
             k2 = rate(time + h / 3, z + h / 3 * k1)
             k3 = rate(time + h / 3, z + h / 6 * (k1 + k2))

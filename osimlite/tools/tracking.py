@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -97,9 +98,14 @@ class Desired:
             self.times, np.hstack([self.speeds, self.accelerations]).reshape(-1, 2 * size)
         )
 
+    def poses(self, times: Sequence[float]) -> tuple[Array, Array]:
+        """Values (k, n) and their rates (k, n) at some times, s."""
+        q, rates = self._curves[0].derivatives(times, (0, 1))
+        return q, rates
+
     def pose(self, t: float) -> tuple[Array, Array]:
         """Values (n,) and their rates (n,) at a time, s."""
-        q, rates = self._curves[0].derivatives([t], (0, 1))
+        q, rates = self.poses([t])
         return q[0], rates[0]
 
     def at(self, times: Array | float) -> Array:
