@@ -24,7 +24,6 @@ QUICK_CASES: dict[str, tuple[str, ...]] = {
     ),
     "tests/oracle/test_joint_reaction.py::test_forces_of_constraints": ("couplers",),
     "tests/oracle/test_lab_pipelines.py::test_a_motion_off_the_constraints_is_tracked": ("rra.xml",),
-    "tests/oracle/test_lab_pipelines.py::test_closed_loops_are_tracked": ("as it is",),
     "tests/oracle/test_moco.py::test_loads": ("explicit",),
     "tests/optimal/check_studies.py::test_exact_hessian_finds_it_too": ("pendulum-50",),
     "tests/optimal/check_studies.py::test_scaled_variables_find_it_too": ("pendulum-50-limited-memory",),
@@ -37,12 +36,20 @@ QUICK_CASES: dict[str, tuple[str, ...]] = {
     "tests/oracle/test_lint_setups.py::test_opensim_computes_something_else": (
         "feet swapped", "forces of ground", "56",
     ),
-    "tests/oracle/test_walkers.py::test_it_walks_on": ("human-walker",),
     "tests/sweep/test_run.py::test_a_command_that_is_ended_goes_on": ("2",),
-    "tests/tools/test_many.py::test_what_is_there_is_whole_and_resuming_ends_with_the_same_bytes": ("worker killed",),
+    "tests/optimal/check_faults.py::test_a_fault_is_told": ("placed",),
+    "tests/oracle/test_random_faults.py::test_what_opensim_refuses_is_found": ("pendulum",),
+    "tests/oracle/test_simulation.py::test_motion_forces_and_labels": (
+        "mass-matrix-tumbling-start1-0.6", "articulated-body-dynamic_walker-start0-1.0",
+    ),
 }  # fmt: skip
 
 QUICK_STRIDES: dict[str, int] = {
+    "tests/optimal/check_derivatives.py::test_models_with_constraints": 3,
+    "tests/optimal/check_derivatives.py::test_schemes_and_dynamics": 3,
+    "tests/oracle/test_moco.py::test_what_moco_takes_without_a_word": 3,
+    "tests/simulation/engines/test_imports.py::test_neither_numba_nor_scipy_is_imported": 3,
+    "tests/sweep/test_optimize.py::test_an_interrupted_search_goes_on": 3,
     "tests/cli/test_doctor.py::test_what_is_needed_is_enough_and_is_needed": 3,
     "tests/document/test_imports.py::test_what_a_short_command_leaves_out": 3,
     "tests/lint/test_adoption.py::test_the_action_checks_every_path": 3,

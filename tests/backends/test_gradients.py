@@ -67,6 +67,7 @@ def test_muscles_with_tendons_that_start_in_equilibrium():
     assert found == pytest.approx(wanted, rel=1e-5)
 
 
+@pytest.mark.full
 def test_a_search_arrives(tmp_path):
     """The motor lifts the rod with the least effort."""
     vary = {f"motor/control@{t:g}": (-20.0, 20.0) for t in (0.0, 0.2, 0.4)}

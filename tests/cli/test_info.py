@@ -25,6 +25,7 @@ def test_info_breaks_no_name_and_says_units():
     assert any("8 Coordinate," in line for line in lines) and max(map(len, lines)) <= 80
 
 
+@pytest.mark.full
 def test_info_says_of_a_changed_model_anew_whether_it_can_be_simulated(tmp_path, own_cache):
     file, text = tmp_path / "walker.osim", WALKER.read_text()
 

@@ -60,6 +60,7 @@ def test_a_walker_is_found_that_never_stops(found):
     assert (cycle.length, cycle.period) == pytest.approx((gait.found.cycle.length, gait.found.cycle.period), rel=1e-7)
 
 
+@pytest.mark.full
 def test_only_the_numbers_that_may_change_do_and_have_few_digits(found):
     gait, folder, _ = found
     before, after = dynamic_walker(), read(folder / "best.osim")

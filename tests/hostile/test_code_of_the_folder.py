@@ -42,6 +42,7 @@ def call(folder: Path, *words: object) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.full
 def test_doctor_executes_nothing_of_the_folder(trap: Path) -> None:
     done = call(trap, "doctor")
     assert done.returncode in (0, 1) and "Traceback" not in done.stderr

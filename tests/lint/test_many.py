@@ -157,6 +157,7 @@ def _places(value, *way):
         yield from _places(part, *way, key)
 
 
+@pytest.mark.full
 def test_an_entry_with_anything_of_another_type_is_no_entry(project, checked, findings_cache):
     first = check_files([str(project / "m.osim")], Config())
     (entry,) = findings_cache.rglob("*.json")

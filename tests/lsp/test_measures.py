@@ -14,6 +14,7 @@ def of_paths(diagnostics):
 
 
 @pytest.mark.asyncio
+@pytest.mark.full
 async def test_after_a_pause(editor, fixtures, tmp_path) -> None:
     text = (fixtures / "lint" / "OSIM632" / "fail-02-two-coordinates.osim").read_text()
     file = editor(tmp_path / "legs.osim", text)

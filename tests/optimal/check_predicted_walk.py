@@ -34,6 +34,7 @@ def walk(tmp_path_factory):
     return folder, osimlite.moco.solve(study, folder=folder)
 
 
+@pytest.mark.full
 def test_it_walks_as_fast_as_it_is_told(walk):
     folder, found = walk
     assert found.success
@@ -96,6 +97,7 @@ def test_standard_output_gets_the_model_alone(tmp_path, monkeypatch, capfd):
     assert not [*Path().iterdir()]
 
 
+@pytest.mark.full
 def test_a_report_shows_what_was_found(walk):
     """Goals, controls, the ground's forces, and how far a simulation stays with it."""
     folder, found = walk

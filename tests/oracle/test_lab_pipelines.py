@@ -115,6 +115,7 @@ LOOPS = {
 
 
 @pytest.mark.parametrize("loop", [*LOOPS])
+@pytest.mark.full
 def test_closed_loops_are_tracked(tmp_path: Path, loop: str) -> None:
     folder = copy_lab("loop", tmp_path)
     change(folder / "bars.osim", *LOOPS[loop])

@@ -59,6 +59,7 @@ print(json.dumps([terms, missed[0].size, found.objective, found.success, found.p
 """
 
 
+@pytest.mark.full
 def test_markers_controls_and_bounds_over_time(tmp_path):
     """Moco's solution has Moco's costs here, with factors by which columns count, and ours costs no more."""
     osim = pytest.importorskip("opensim")
@@ -481,6 +482,7 @@ print(json.dumps(moco.evaluated(Program(problem), moco.MocoTrajectory.read("thei
 """
 
 
+@pytest.mark.full
 def test_tracked_markers(tmp_path):
     """After five of its iterations Moco's costs are those that are found here."""
     osim = pytest.importorskip("opensim")

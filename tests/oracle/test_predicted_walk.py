@@ -54,6 +54,7 @@ def build(tmp_path, repo):
     return built
 
 
+@pytest.mark.full
 def test_moco_has_the_same_costs(build, repo):
     """Of the guess, as Ipopt moves it away from the bounds."""
     model = build(num_mesh_intervals=4, optim_max_iterations=0)

@@ -44,6 +44,7 @@ def walks(fixtures):
 
 
 @pytest.mark.parametrize("name", ["steady-walker", "human-walker"])
+@pytest.mark.full
 def test_it_walks_on(walks, name):
     theirs, _ = walks[name]
     assert theirs.walks and theirs.end == MINUTE and theirs.scuffs == []

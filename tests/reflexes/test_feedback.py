@@ -359,6 +359,7 @@ def test_many_runs_are_single_ones_bit_for_bit(model) -> None:
         Runner(plan(model, {"elbow": "0.3:1.5"}, measures=("max(motor)",), controller=feedback))
 
 
+@pytest.mark.full
 def test_sweeps_go_by_a_file(model, tmp_path) -> None:
     pytest.importorskip("yaml", reason="needs PyYAML (extra 'yaml')")
     pytest.importorskip("pyarrow", reason="needs pyarrow (extra 'sweep')")

@@ -155,6 +155,7 @@ def test_a_search_finds_higher_jumps(folder, tmp_path) -> None:
     assert given.walk(found).report["jump height"][0] > before + 3.0
 
 
+@pytest.mark.full
 def test_kernels_as_python_jump_likewise(folder, monkeypatch) -> None:
     """Where a place outside an array is an error."""
     from tests.simulation.checked import Checked

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
 import osimlite
 from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model
 from osimlite.schema.actuators import (
@@ -346,6 +348,10 @@ FORCES = {
     "prescribed in ground": lambda: pushed(forceIsGlobal=True, pointIsGlobal=True),
     "prescribed in the body": lambda: pushed(forceIsGlobal=False, pointIsGlobal=False),
 }
+
+# Its path is found on three surfaces at once, which takes half as long as all other forces together.
+FORCE_NAMES = [pytest.param(name, marks=pytest.mark.full) if name == "path over obstacles" else name for name in FORCES]
+"""The forces as parameters of a test."""
 
 
 def with_force(make) -> Model:

@@ -59,6 +59,7 @@ def test_a_force_that_is_switched_off_does_nothing(tmp_path):
     assert not osimlite.simulate(model, 0.01, folder=tmp_path).forces
 
 
+@pytest.mark.full
 def test_fixed_steps_converge_at_first_order(tmp_path):
     model = thrown(tmp_path, dissipation=0.5, friction=0.5)
     best = osimlite.simulate(model, 0.2, accuracy=1e-9, folder=tmp_path)

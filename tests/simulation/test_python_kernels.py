@@ -11,7 +11,7 @@ from osimlite.multibody import build_mechanism
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine
 from tests.simulation.checked import Checked, bounded
-from tests.simulation.force_cases import FORCES, with_force
+from tests.simulation.force_cases import FORCE_NAMES, FORCES, with_force
 from tests.simulation.test_compiled_forces import states
 
 FILES = ("walker/DynamicWalkerModel.osim", "walkers/steady-walker.osim", "kinematics/mixed_joint_tree.osim")
@@ -37,7 +37,7 @@ def compare(model: osimlite.Model, monkeypatch: pytest.MonkeyPatch, count: int =
         assert np.allclose(records, compiled.force_records(t, y), rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", FORCES)
+@pytest.mark.parametrize("name", FORCE_NAMES)
 def test_force(name, monkeypatch):
     compare(with_force(FORCES[name]), monkeypatch, count=1)
 

@@ -210,6 +210,7 @@ def test_workers_that_cannot_do_the_task_are_told(cluster, walker, tmp_path, mon
 
 
 @pytest.mark.skipif(os.name == "nt", reason="sends signals")
+@pytest.mark.full
 def test_a_scheduler_that_goes_is_told_and_nothing_is_lost(tmp_path_factory, walker, tmp_path, monkeypatch):
     lost = Cluster(tmp_path_factory.mktemp("lost"))
     try:

@@ -58,6 +58,7 @@ def test_results_are_tables_and_show_themselves(made, tmp_path):
         outcome.to_frame()
 
 
+@pytest.mark.full
 def test_processes_of_bullet_too(walker, tmp_path):
     pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     made = plan(walker, {"RHip_rz": (0.3, 0.7)}, to=0.2, engine="bullet")

@@ -45,6 +45,7 @@ def walks_of(made, rows):
 
 
 @pytest.mark.parametrize("vary", [VARY, MODELS], ids=["one model", "many models"])
+@pytest.mark.full
 def test_progress_counts_steps_before_the_first_scuff(walker, vary):
     rows = points(vary)
     made = plan(walker, vary, measures=("progress", "steps"), to=2.0, is_planted=True, accuracy=1e-5)

@@ -193,6 +193,7 @@ def await_results(folder: Path, least: int, process: subprocess.Popen[str]) -> N
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("how", ["keyboard", "all killed", "worker killed"])
+@pytest.mark.full
 def test_what_is_there_is_whole_and_resuming_ends_with_the_same_bytes(trials: Path, how: str) -> None:
     for seed in range(3, 12):
         make_trial(trials / f"trial{seed}", seed, 400)

@@ -112,6 +112,7 @@ def test_a_page_says_what_the_results_are_worth(trials: Path) -> None:
     assert f"{largest:.3g} cm" in part or "&lt;0.001 cm" in part
 
 
+@pytest.mark.full
 def test_a_setup_that_fails_stops_no_report(trials: Path) -> None:
     (trials / "trial0" / "trial.trc").unlink()
     words = [f"trial{k}/{name}.xml" for k in range(2) for name in ("id", "z_ik")]

@@ -21,7 +21,7 @@ from osimlite.simulation.system import System
 from tests.backends.jets import Jet, _carried
 from tests.simulation.checked import Checked
 from tests.simulation.elements.muscle_rows import CONFIGURATIONS, hung, muscle
-from tests.simulation.force_cases import FORCES, with_force
+from tests.simulation.force_cases import FORCE_NAMES, FORCES, with_force
 
 STATES = 2
 
@@ -43,7 +43,7 @@ def jets_of(kind: Any, given: tuple[Any, ...]) -> tuple[list[Any], list[int]]:
     return [flat[k] if isinstance(flat[k], Jet) else part for k, part in enumerate(rest)], [*changed]
 
 
-@pytest.mark.parametrize("case", [*FORCES, *CONFIGURATIONS])
+@pytest.mark.parametrize("case", [*FORCE_NAMES, *CONFIGURATIONS])
 def test_they_are_derivatives_of_the_law(case, monkeypatch):
     """In machine code and in Python; of whichever side the law takes where it bends."""
     is_muscle = case in CONFIGURATIONS

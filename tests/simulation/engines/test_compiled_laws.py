@@ -137,6 +137,7 @@ def test_without_a_compiler(folder, monkeypatch):
         compile_function("answer", answer, 0)
 
 
+@pytest.mark.full
 def test_a_second_process_compiles_nothing(tmp_path):
     """The files of one process serve the next, which is given no compiler."""
     program = (

@@ -40,7 +40,7 @@ def text(kind, side):
 
 @pytest.mark.parametrize("distance", [None, 0.1, 0.45, 1.0])
 @pytest.mark.parametrize("kind", ["sphere", "cylinder"])
-@pytest.mark.parametrize("which", ["installed", "older"])
+@pytest.mark.parametrize("which", ["installed", pytest.param("older", marks=pytest.mark.full)])
 def test_as_mujoco(which, kind, distance, request):
     python = sys.executable if which == "installed" else request.getfixturevalue("older")
     random = np.random.default_rng(3)
