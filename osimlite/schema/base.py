@@ -106,12 +106,16 @@ class Object(BaseModel, metaclass=ObjectType):
             properties[spec.name] = properties.pop(given)
         values = _check_values(type(self), properties)
         if values is not None:
-            self._fill(values, set(properties))
-            return
-        try:
-            super().__init__(**properties)
-        except ValidationError as error:
-            raise ModelError(explained(type(self), error)) from None
+            made = self.build(values, set(properties))
+            _put_state(self, made.__dict__)
+            _put_present(self, made.model_fields_set)
+            _put_extra(self, None)
+            _put_private(self, None)
+        else:
+            try:
+                super().__init__(**properties)
+            except ValidationError as error:
+                raise ModelError(explained(type(self), error)) from None
         _set(self, "_model", None)
         _set(self, "_index", None)
         _set(self, "_layout", None)
@@ -125,17 +129,10 @@ class Object(BaseModel, metaclass=ObjectType):
         `values` may leave out properties, `present` names those the text gave; the rest take their defaults. This is
         the reader's way in, several times faster than ``cls(...)`` and tested to be equal to it.
         """
-        self = _new(cls)
-        self._fill(values, present, index, home)
-        return self
-
-    def _fill(
-        self, values: dict[str, Any], present: set[str], index: int | None = None, home: Home | None = None
-    ) -> None:
-        """Put values of the stored form into a new instance; the arguments are those of `build`."""
         # Default objects and lists are made when someone asks for them, see `__getattr__`: most are never asked for.
-        state = defaults(type(self))[0].copy()
+        state = defaults(cls)[0].copy()
         state.update(values)
+        self = _new(cls)
         _put_state(self, state)
         _put_present(self, present)
         _put_extra(self, None)
@@ -143,6 +140,7 @@ class Object(BaseModel, metaclass=ObjectType):
         put_model(self, home)
         put_index(self, index)
         _put_layout(self, None)
+        return self
 
     @classmethod
     def model_construct(cls, _fields_set: set[str] | None = None, **values: Any) -> Self:
