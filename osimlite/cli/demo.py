@@ -53,8 +53,8 @@ def demo(
     """Build, check, translate and simulate: a walker that falls, one that walks, humans who jump and walk by muscles.
 
     The first is the model of the OpenSim exercise "Building a Dynamic Walker". All four then play in the browser, with
-    the forces of the ground and the muscles in the colours of their activations. The tour takes some five seconds,
-    the first time some twenty, since code is compiled then. It needs no display.
+    the forces of the ground and the muscles in the colours of their activations. The tour takes some four seconds and
+    needs no display.
 
     Example: osimlite demo -o tour --no-browser
     """
