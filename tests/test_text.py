@@ -8,9 +8,10 @@ import re
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rapidfuzz import fuzz
 
 from osimlite.errors import OsimliteError
-from osimlite.text import harmless, json_lines, visible
+from osimlite.text import FEW_NAMES, harmless, json_lines, measure_similarity, nearest, visible
 
 OBEYED = re.compile(r"[\0-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 anything = st.text(st.one_of(st.characters(codec=None), st.sampled_from("\n\r\t\x1b\x9b\x85\u202e\u2028\udce9[]m#:0 ")))
@@ -85,3 +86,24 @@ def test_errors_and_findings_are_one_line() -> None:
     assert str(error) == r"\x1b[2J.osim:3: no body 'a\n::error::b'" and "\n" in error.message
     finding = Finding("OSIM101", "unknown-tag", Severity.ERROR, "a\nb", "\x9b.osim", suggestion="\u202e")
     assert str(finding) == r"\x9b.osim: error OSIM101 a\nb (did you mean '\u202e'?)"
+
+
+names = st.text(st.sampled_from("abc_rlé"), max_size=12)
+
+
+@given(names, names)
+def test_similarity_is_that_of_rapidfuzz(word: str, text: str) -> None:
+    assert measure_similarity(word)(text) == fuzz.ratio(word, text)
+
+
+@given(names, st.lists(names, max_size=8))
+def test_few_names_are_compared_as_many_are(word: str, known: list[str]) -> None:
+    many = [*known, *("%" for _ in range(FEW_NAMES + 1))]
+    assert nearest(word, known) == nearest(word, many)
+
+
+def test_the_nearest_name() -> None:
+    assert nearest("Tibia_R", ["femur_r", "tibia_l", "tibia_r"]) == "tibia_r"
+    assert nearest("tibia", ["femur_r", "tibia_l", "tibia_r"]) == "tibia_l"
+    assert nearest("xyz", ["femur_r", "tibia_l"]) is None
+    assert nearest("xyz", []) is None
