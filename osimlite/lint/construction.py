@@ -32,6 +32,7 @@ class Stage(StrEnum):
 
     MECHANISM = "mechanism"
     FORCE = "force"
+    CABLE = "cable"
     ASSEMBLY = "assembly"
     CLAMP = "clamp"
     INERTIA = "inertia"

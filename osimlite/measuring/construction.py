@@ -26,6 +26,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.scholz_paths import Scholz2015GeometryPath
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.geometries.paths.scholz2015_geometry_path import check as check_cable
 from osimlite.simulation.elements.items import ForceElement
 from osimlite.simulation.elements.probe import probe_elements
 from osimlite.simulation.engines.linking import AT_HAND
@@ -98,7 +99,11 @@ class _Construction:
             return
         for force in builder.forces():
             if isinstance(getattr(force, "geometry_path", None), Scholz2015GeometryPath):
-                # To find its way takes seconds without machine code.
+                # Its way is searched once; in every evaluation it takes seconds without machine code.
+                try:
+                    check_cable(builder, force)
+                except OsimliteError as error:
+                    yield self.describe(error, Stage.CABLE, builder.path(force))
                 continue
             try:
                 elements.append(builder.element(force))

@@ -98,6 +98,22 @@ def expressions() -> list[Case]:
         ("q-pi", "OSIM606"),
         ("+q", "OSIM606"),
         ("", "OSIM606"),
+        ("0*x", ""),
+        ("x*0+q", ""),
+        ("x-x", ""),
+        ("x/x", ""),
+        ("x^0", ""),
+        ("0^x", ""),
+        ("0/x", ""),
+        ("2*x-x*2", ""),
+        ("(q-q)*x", ""),
+        ("0*log(q-0.3)", ""),
+        ("0*q/0", ""),
+        ("q;y=z", ""),
+        ("1*x", "OSIM606"),
+        ("x*cos(0)", "OSIM606"),
+        ("0*foo(x)", "OSIM606"),
+        ("q;y=", "OSIM606"),
         ("1/(q-0.3)", "OSIM532"),
         ("log(q-0.3)", "OSIM532"),
         ("sqrt(q-1)", "OSIM532"),
@@ -296,6 +312,71 @@ def contradictions() -> list[Case]:
     return cases
 
 
+def cables() -> list[Case]:
+    """Return paths over obstacles that OpenSim can lay, and others that it cannot."""
+    sizes = {
+        "ContactSphere": "<radius>0.1</radius>",
+        "ContactCylinder": "<radius>0.1</radius>",
+        "ContactEllipsoid": "<radii>0.1 0.1 0.12</radii>",
+        "ContactTorus": "<torus_radius>0.1</torus_radius><tube_radius>0.02</tube_radius>",
+        "ContactHalfSpace": "<orientation>0 0 -1.5707963267948966</orientation>",
+    }
+
+    def cable(kind: str, end: str, hint: str = "", frame: str = A, middle: str = "", force: str = "PathSpring") -> str:
+        def point(name: str, base: str, place: str) -> str:
+            return (
+                f'<Scholz2015GeometryPathPoint name="{name}"><PathPoint name="x"><socket_parent_frame>{base}'
+                f"</socket_parent_frame><location>{place}</location></PathPoint></Scholz2015GeometryPathPoint>"
+            )
+
+        def over(name: str, where: str) -> str:
+            hinted = f"<contact_hint>{where}</contact_hint>" if where else ""
+            return (
+                f'<Scholz2015GeometryPathObstacle name="o{name}"><socket_contact_geometry>/contactgeometryset/{name}'
+                f"</socket_contact_geometry>{hinted}</Scholz2015GeometryPathObstacle>"
+            )
+
+        second = f'<ContactSphere name="h"><socket_frame>{A}</socket_frame><location>{middle}</location>'
+        second = f"{second}<radius>0.12</radius></ContactSphere>" if middle else ""
+        elements = point("p", GROUND, "-0.5 -0.3 0") + over("g", hint) + (over("h", "") if middle else "")
+        elements += point("r", A, end)
+        springy = "<resting_length>0.1</resting_length><stiffness>10</stiffness><dissipation>0</dissipation>"
+        forces = (
+            f'<{force} name="f"><Scholz2015GeometryPath name="path"><path_elements>{elements}</path_elements>'
+            f"</Scholz2015GeometryPath>{springy if force == 'PathSpring' else ''}</{force}>"
+        )
+        geometry = f'<{kind} name="g"><socket_frame>{frame}</socket_frame>{sizes[kind]}</{kind}>{second}'
+        return small_model(forces=forces, geometry=geometry)
+
+    cases = []
+    for kind in sizes:
+        is_plane, is_ring = kind == "ContactHalfSpace", kind == "ContactTorus"
+        inside = "0.4 -0.02 0" if is_plane else "0.1 0.01 0" if is_ring else "0.05 0.02 0"
+        middle = "0 0 0.2" if is_ring else "0 0 0"
+        if not is_plane:
+            cases.append(Case(f"a path over a {kind}", cable(kind, "0.4 0.02 0"), "", RUNS))
+            cases.append(Case(f"a hint in the middle of a {kind}", cable(kind, "0.4 0.02 0", middle), "OSIM534", FAILS))
+        for force in ("PathSpring", "PathActuator", "Millard2012EquilibriumMuscle"):
+            cases.append(Case(f"{force}: a point in a {kind}", cable(kind, inside, force=force), "OSIM534", FAILS))
+    sphere = "ContactSphere"
+    # OpenSim takes the place in an offset frame for one in its body.
+    by_offset = cable(sphere, "0.02 0.32 0", frame="/jointset/j/c")
+    cases += [
+        Case(
+            "a point in a sphere of an offset frame",
+            cable(sphere, "0.02 0.02 0", frame="/jointset/j/c"),
+            "OSIM534",
+            FAILS,
+        ),
+        Case("a point in a sphere by its offset frame", by_offset, "", RUNS),
+        Case(
+            "a point in the second of two obstacles", cable(sphere, "0.4 0.02 0", middle="0.35 0 0"), "OSIM534", FAILS
+        ),
+        Case("a path over two obstacles", cable(sphere, "0.4 0.02 0", middle="-0.55 0 0"), "", RUNS),
+    ]
+    return cases
+
+
 def functions() -> list[Case]:
     """Return functions that OpenSim computes otherwise than one may expect, and others that it refuses."""
     table = (
@@ -453,6 +534,7 @@ CASES = [
     *expressions(),
     *constraints(),
     *contradictions(),
+    *cables(),
     *functions(),
     *texts(),
     *frames(),

@@ -58,7 +58,7 @@ LEFT, RIGHT = point("/ground", -0.3, 0.01, 0), point("/bodyset/b", 0, 0.01, 0)
         ((LEFT, over(), RIGHT), ContactSphere(radius=0.0), "not positive"),
         ((LEFT, over(), RIGHT), ContactEllipsoid(radii=(0.1, 0.0, 0.1)), "not positive"),
         ((LEFT, over(), RIGHT), ContactTorus(torus_radius=0.1, tube_radius=-0.1), "not positive"),
-        ((LEFT, over(), RIGHT), ContactSphere(radius=0.4), "inside an obstacle where the model starts"),
+        ((LEFT, over(), RIGHT), ContactSphere(radius=0.4), "no way over its obstacles where the model starts"),
     ],
 )
 def test_impossible(elements, surface, says):

@@ -222,6 +222,46 @@ def not_computed(subject: Subject, report: FindingSink) -> None:
         _report(subject, report, first, message)
 
 
+@rule("OSIM534", "impassable-obstacle", severity=ERROR, about=CONSTRUCTION)
+def impassable_obstacle(subject: Subject, report: FindingSink) -> None:
+    """A path cannot be laid over an obstacle.
+
+    Reports paths over obstacles (Scholz2015GeometryPath) of which a point, or another obstacle, is inside
+    an obstacle in the default pose, as written or as assembled; and those whose search fails, since
+    a `contact_hint` is in the middle of the surface or leads nowhere.
+
+    OpenSim refuses the model: it lays the path as soon as it initialises the system. A GeometryPath
+    is another matter, it goes straight through a surface that a point of it is inside of (OSIM616).
+
+    ```xml
+      <PathSpring name="cable">
+          <Scholz2015GeometryPath name="path">
+              <path_elements>
+                  <Scholz2015GeometryPathPoint name="a">
+                      <PathPoint name="start">
+                          <socket_parent_frame>/bodyset/shank</socket_parent_frame> <location>0.1 0 0</location>
+                      </PathPoint>
+                  </Scholz2015GeometryPathPoint>
+                  <Scholz2015GeometryPathObstacle name="over">
+                      <socket_contact_geometry>/contactgeometryset/heel</socket_contact_geometry>
+                  </Scholz2015GeometryPathObstacle>
+                  <Scholz2015GeometryPathPoint name="b">
+                      <PathPoint name="end">
+                          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+    -                     <location>0.04 -0.2 0</location>
+    +                     <location>0.06 -0.2 0</location>
+                      </PathPoint>
+                  </Scholz2015GeometryPathPoint>
+              </path_elements>
+          </Scholz2015GeometryPath>
+          <resting_length>0.1</resting_length> <stiffness>100</stiffness> <dissipation>0</dissipation>
+      </PathSpring>
+    ```
+    """
+    for obstacle in _select_unreported(subject, report, Stage.CABLE):
+        _report(subject, report, obstacle, f"{obstacle.message}: OpenSim refuses the model")
+
+
 def _select_unreported(subject: Subject, report: FindingSink, stage: Stage) -> Iterator[Obstacle]:
     """Yield the obstacles of a stage whose cause no other rule has reported."""
     errors = [item for item in report.findings if item.severity == ERROR]

@@ -6,11 +6,12 @@ forces at points are applied where they belong. So it is here.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any, ClassVar
 
 import numpy as np
 
-from osimlite.errors import ModelError
+from osimlite.errors import ModelError, OsimliteError
 from osimlite.kernels.cable_paths import (
     ELEMENT_INTS,
     ELEMENTS,
@@ -27,7 +28,7 @@ from osimlite.kernels.cable_paths import (
     cable_path,
     solver_room,
 )
-from osimlite.kernels.cable_surfaces import CYLINDER, ELLIPSOID, END, POINT, SPHERE, START, STEP, TORUS
+from osimlite.kernels.cable_surfaces import CYLINDER, ELLIPSOID, END, POINT, SPHERE, START, STEP, TORUS, value
 from osimlite.kernels.layout import ITEM
 from osimlite.kernels.paths import LENGTH
 from osimlite.kernels.wrap_curves import MOST
@@ -35,7 +36,14 @@ from osimlite.multibody.links import Placement, Places
 from osimlite.multibody.mechanism import GROUND, Mechanism
 from osimlite.multibody.spatial import Array, offset
 from osimlite.records import dataclass, replace
-from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactGeometry, ContactSphere, ContactTorus
+from osimlite.schema.contact import (
+    ContactCylinder,
+    ContactEllipsoid,
+    ContactGeometry,
+    ContactHalfSpace,
+    ContactSphere,
+    ContactTorus,
+)
 from osimlite.schema.scholz_paths import Scholz2015GeometryPathPoint
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of
 from osimlite.simulation.elements.items import Item
@@ -158,9 +166,58 @@ def read(builder: ElementBuilder, owner: Any) -> Cable:
         cable = cable.found(builder.mechanism, assembled)
     if cable is None:
         raise ModelError(
-            f"the path of '{builder.path(owner)}' has a point inside an obstacle where the model starts; move it out"
+            f"the path of '{builder.path(owner)}' has no way over its obstacles where the model starts: a point or "
+            "another obstacle is inside one, or a contact_hint leads nowhere; move them apart"
         )
     return cable
+
+
+def check(builder: ElementBuilder, owner: Any) -> None:
+    """Check whether OpenSim can lay a path over its obstacles, and name the point where one is inside.
+
+    Raises:
+        UnsupportedError: there is an obstacle of a kind that a cable cannot run over, and OpenSim may.
+        ModelError: a point is inside an obstacle, a contact hint is where no point of the surface is
+            nearest, or the search fails.
+    """
+    items = list(owner.geometry_path.path_elements)
+    for index, item in enumerate(items):
+        if isinstance(item, Scholz2015GeometryPathPoint):
+            continue
+        geometry = builder.target(item, "socket_contact_geometry", item.socket_contact_geometry)
+        # OpenSim compares an obstacle with its neighbours, and with points beyond only if it touches none between.
+        for other in items[max(index - 1, 0) : index + 2]:
+            if isinstance(other, Scholz2015GeometryPathPoint) and _is_enclosed(builder, other, geometry):
+                name = other.name or other.path_point.name
+                raise ModelError(
+                    f"the point '{name}' of the path of '{builder.path(owner)}' is inside the "
+                    f"obstacle '{geometry.name}' where the model starts; move it out"
+                )
+    read(builder, owner)
+
+
+def _is_enclosed(builder: ElementBuilder, point_item: Any, geometry: ContactGeometry) -> bool:
+    """Return whether a point of a path is inside an obstacle in a pose that OpenSim starts from."""
+    mechanism = builder.mechanism
+    poses = [mechanism.values({})]
+    # Another rule reports constraints that no pose meets.
+    with suppress(OsimliteError):
+        poses.append(mechanism.default_state()[0])
+    point = _point(builder, point_item)
+    body, _ = builder.placement(builder.target(geometry, "socket_frame", geometry.socket_frame))
+    surface = _surface(geometry)
+    if surface is None and not isinstance(geometry, ContactHalfSpace):
+        return False
+    for q in poses:
+        state = mechanism.at(q)
+        frame = state.transform(body) @ offset(geometry.location, geometry.orientation)
+        placed = state.transform(point.body) @ np.array([*point.runs, 1.0])
+        x, y, z = (frame[:3, :3].T @ (placed[:3] - frame[:3, 3])).tolist()
+        # A half-space is solid where x is positive.
+        depth = x if surface is None else value(np.array(surface), (x, y, z))
+        if depth > 0.0:
+            return True
+    return False
 
 
 def _point(builder: ElementBuilder, item: Any) -> Point:
@@ -189,6 +246,11 @@ def _obstacle(builder: ElementBuilder, owner: Any, item: Any) -> Obstacle:
     if has_hint:
         begin[STATE] = GUESSED
         begin[TRACKED : TRACKED + 3] = hint
+        if _is_middle(surface, hint):
+            raise ModelError(
+                f"the contact_hint of the obstacle '{geometry.name}' of the path of '{builder.path(owner)}' is in the "
+                "middle of the surface, so that no point of it is nearest; move it off the middle"
+            )
         near = _nearest(surface, hint)
         for end in (START, END):
             begin[GEODESIC + end + POINT : GEODESIC + end + POINT + 3] = near
@@ -207,6 +269,15 @@ def _surface(geometry: ContactGeometry) -> tuple[float, ...] | None:
     if isinstance(geometry, ContactTorus):
         return TORUS, geometry.torus_radius, geometry.tube_radius, 0.0, 0.0, 0.0
     return None
+
+
+def _is_middle(surface: tuple[float, ...], hint: Array) -> bool:
+    """Return whether a surface has no normal through a point: its center, its axis, the ring in a torus."""
+    kind, radius, _, *weights = surface
+    if kind == TORUS:
+        across = float(np.hypot(hint[0], hint[1]))
+        return across == 0.0 or (across == radius and hint[2] == 0.0)
+    return not (np.array(weights) * hint).any()
 
 
 def _nearest(surface: tuple[float, ...], hint: Array) -> Array:
