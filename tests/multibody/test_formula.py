@@ -51,6 +51,51 @@ def test_definitions_that_double_are_written_once():
     assert value(text) == pytest.approx(0.7)
 
 
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("0*x", 0.0),
+        ("q + x - x", None),
+        ("x/x", 1.0),
+        ("x - x + q", 0.7),
+        ("x^0 + 0^y", 1.0),
+        ("2*x - x*2 + q", 0.7),
+        ("-x*-y - x*y", 0.0),
+        ("(1/x)*x", 1.0),
+        ("sqrt(square(u))", 1.3),
+        ("0*log(q - q)", 0.0),
+        ("0*q/0", 1.0),
+        ("(0/q)^0", 0.0),
+        ("q; a = b", 0.7),
+        ("0*a; a = b", 0.0),
+    ],
+)
+def test_what_drops_out_may_be_unknown_or_nan(text, expected):
+    """As in Lepton, which OpenSim simplifies formulas by before it computes them."""
+    if expected is None:
+        with pytest.raises(ModelError, match="there is no 'x'"):
+            value(text)
+    else:
+        assert value(text) == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("1*x", "there is no 'x'"),
+        ("x + 0", "there is no 'x'"),
+        ("x/(1/0)", "there is no 'x'"),
+        ("x*cos(0)", "there is no 'x'"),
+        ("0*(1/0)", "not a number"),
+        ("min(q, 0/0)", "not a number"),
+        ("0*(x", "parentheses"),
+    ],
+)
+def test_what_does_not_drop_out_is_refused(text, says):
+    with pytest.raises(ModelError, match=says):
+        value(text)
+
+
 LONG = 20_000
 
 
