@@ -125,7 +125,7 @@ def repaired(text: str) -> tuple[str, list[Repair]]:
         text = _blanked(unended[0]) + text[unended.end() :]
     pieces: list[str] = []
     place = depth = 0
-    for kind, start, end, _ in markup(text):
+    for kind, start, end, _ in markup(text, as_opensim=True):
         gap, piece = text[place:start], text[start:end]
         pieces.append(_outside(gap, place, repairs) if not depth else _ampersands(gap, place, repairs))
         if kind == "comment":
@@ -154,7 +154,7 @@ def repaired(text: str) -> tuple[str, list[Repair]]:
 def _unended(text: str) -> int | None:
     """Where a comment or its like begins that never ends."""
     place = 0
-    for _, _, end, _ in markup(text):
+    for _, _, end, _ in markup(text, as_opensim=True):
         place = end
     result = _SPECIAL.search(text, place)
     return None if result is None else result.start()
@@ -172,7 +172,9 @@ def _outside(text: str, offset: int, repairs: list[Repair]) -> str:
         repairs.append(Repair("overlooked", offset + len(before), nul, "OpenSim reads no further"))
         return _blanked(text)
     stripped = text.strip("\ufeff \t\r\n")
-    if stripped and "<" not in stripped:
+    if offset and stripped.startswith("<?") and ">" not in stripped:
+        repairs.append(Repair("overlooked", offset + text.index("<?"), stripped[:40], "OpenSim reads no further"))
+    elif stripped and "<" not in stripped:
         word = stripped.splitlines()[0][:40]
         repairs.append(Repair("text-outside-root", offset + text.index(stripped), word, ""))
     elif not stripped and "\ufeff" in text:
@@ -205,7 +207,9 @@ def _attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
 
 
 def _is_no_instruction(piece: str) -> bool:
-    """Whether what stands between ``<?`` and ``?>`` is neither a declaration nor an instruction of XML."""
+    """Whether what stands between ``<?`` and ``>`` is neither a declaration nor an instruction of XML."""
+    if not piece.endswith("?>"):
+        return True
     if _DECLARATION.match(piece):
         return _SOUND_DECLARATION.fullmatch(piece) is None
     return _NAMED.match(piece) is None or _XML_IN_CAPITALS.match(piece) is not None

@@ -107,7 +107,7 @@ class Source:
             plain = PlainSpans(self.text, self.elements)
             if len(plain) == self.elements:
                 return plain
-        return spans_of(self.text)
+        return spans_of(self.text, as_opensim=True)
 
     @property
     def well_formed(self) -> bool:

@@ -49,14 +49,26 @@ _SPECIAL = {
 }
 
 
-def markup(text: str) -> Iterator[Markup]:
-    """Yield the markup of a text in order; it ends where a comment or its like has no end."""
+_INSTRUCTION_END = {False: "?>", True: ">"}
+"""What ends an instruction, by whether the text is read as OpenSim reads it."""
+
+
+def markup(text: str, *, as_opensim: bool = False) -> Iterator[Markup]:
+    """Yield the markup of a text in order; it ends where a comment or its like has no end.
+
+    Args:
+        text: the text.
+        as_opensim: whether an instruction ends at its first ``>``, as it does for OpenSim, and not at
+            ``?>``, as it does for XML.
+    """
     place = 0
     while (match := _MARKUP.search(text, place)) is not None:
         special = match["special"]
         place = match.end()
         if special is not None:
             kind, ending = _SPECIAL[special]
+            if special == "?":
+                ending = _INSTRUCTION_END[as_opensim]
             result = text.find(ending, place)
             if result < 0:
                 return
@@ -97,10 +109,14 @@ def blank_remarks(text: str, character: str = " ") -> str:
     return "".join(pieces)
 
 
-def spans_of(text: str) -> list[Span]:
+def spans_of(text: str, *, as_opensim: bool = False) -> list[Span]:
     """Every element of a text in document order, found by the rules of :func:`markup`.
 
     An element that nothing ends is taken to be empty; an end that nothing began is passed over.
+
+    Args:
+        text: the text.
+        as_opensim: whether an instruction ends at its first ``>``.
     """
     tags: list[str] = []
     starts: list[int] = []
@@ -127,7 +143,7 @@ def spans_of(text: str) -> list[Span]:
             inner_ends.append(end)
             ends.append(end)
         else:
-            ending = _SPECIAL[match["special"]][1]
+            ending = _INSTRUCTION_END[as_opensim] if match["special"] == "?" else _SPECIAL[match["special"]][1]
             result = text.find(ending, end)
             if result < 0:
                 break

@@ -224,3 +224,19 @@ def test_time_is_linear_in_the_length(piece: str) -> None:
         read_text(text)
     assert caught.value.line == 1
     assert time.process_time() - start < 5
+
+
+@pytest.mark.parametrize("instruction", ["<?x >", "<?x y>", "<??>", "<?x <b>"])
+@pytest.mark.parametrize("place", ["<Model", "<gravity", "0 -9", "</gravity>", "</Model>", "</OpenSimDocument>"])
+def test_an_instruction_ends_at_its_first_bracket_as_in_opensim(instruction, place):
+    text = """<?xml version="1.0"?><OpenSimDocument Version="40600"><Model name="m"><gravity> 0 -9 0</gravity>
+</Model></OpenSimDocument>"""
+    model = read_text(text.replace(place, instruction + place, 1))
+    assert model.name == "m"
+    assert list(model.gravity) == [0.0, -9.0, 0.0] or place in ("0 -9", "</gravity>")
+
+
+@pytest.mark.parametrize("rest", ["<?", "<?x", "<?x y", "<?x?"])
+def test_an_open_instruction_after_the_root_is_passed_over(rest):
+    text = '<?xml version="1.0"?><OpenSimDocument Version="40600"><Model name="m"/></OpenSimDocument>'
+    assert read_text(text + rest).name == "m"
