@@ -99,6 +99,7 @@ class Formula:
             where: the path and property it stands in, for messages.
 
         Raises:
+            UnknownVariableError: it needs a variable that there is not.
             ModelError: it is no formula.
         """
         main, *definitions = re.sub(r"\s", "", text).split(";")
@@ -111,7 +112,8 @@ class Formula:
                 reader.known[name] = reader.read(body)
             steps = reader.ending_with(reader.read(main))
         except _Wrong as wrong:
-            raise ModelError(f"{where} is '{text}': {wrong}") from None
+            kind = UnknownVariableError if isinstance(wrong, _UnknownName) else ModelError
+            raise kind(f"{where} is '{text}': {wrong}") from None
         return cls(tuple(variables), steps)
 
     def derivative(self, variable: int) -> Formula:
@@ -133,8 +135,16 @@ class Formula:
         )
 
 
+class UnknownVariableError(ModelError):
+    """A formula can be read and names a variable that there is not."""
+
+
 class _Wrong(Exception):
     """What is wrong with a formula."""
+
+
+class _UnknownName(_Wrong):
+    """A formula needs a name that nothing has."""
 
 
 def _compute(law: str, *numbers: float | None) -> float:
@@ -379,7 +389,7 @@ class _Reader:
             word = self.unknown[int(step.value)]
             near = did_you_mean(word, self.known)
             there = f"there is {listed(list(self.known))}" if self.known else "it has no variables"
-            raise _Wrong(f"there is no '{word}'{near}; {there}")
+            raise _UnknownName(f"there is no '{word}'{near}; {there}")
         if step.law == "number" and math.isnan(step.value):
             raise _Wrong("a part of it without variables is not a number, such as 0/0; remove it")
 

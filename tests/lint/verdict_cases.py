@@ -406,6 +406,51 @@ def functions() -> list[Case]:
     return [Case(function, prescribed(function), code, verdict) for function, code, verdict in table]
 
 
+def unused() -> list[Case]:
+    """Return faults of functions and formulas in what is on, and in what is off."""
+    actuator = (
+        '<CoordinateActuator name="act"><appliesForce>{}</appliesForce><coordinate>q</coordinate>'
+        "<optimal_force>1</optimal_force></CoordinateActuator>"
+    )
+    controller = (
+        '<PrescribedController name="c"><enabled>{}</enabled><socket_actuators>/forceset/act</socket_actuators>'
+        '<FunctionSet name="ControlFunctions"><objects>{}</objects></FunctionSet></PrescribedController>'
+    )
+    prescribed_force = (
+        '<PrescribedForce name="p"><appliesForce>{}</appliesForce><socket_frame>/bodyset/a</socket_frame>'
+        '<FunctionSet name="forceFunctions"><objects>{}</objects></FunctionSet></PrescribedForce>'
+    )
+    points = "<x>0 2 1 3</x><y>0 1 2 3</y></GCVSpline>"
+    faults = (
+        (f'<GCVSpline name="g"><half_order>2</half_order>{points}', "OSIM601"),
+        ('<GCVSpline name="g"><half_order>2</half_order><x>0 1 2 3</x><y>0 1</y></GCVSpline>', "OSIM602"),
+        (f'<GCVSpline name="g">{points.replace("2 1", "1 2")}', "OSIM603"),
+        ('<LinearFunction name="g"><coefficients></coefficients></LinearFunction>', "OSIM604"),
+        ('<MultiplierFunction name="g" />', "OSIM605"),
+        (
+            '<ExpressionBasedFunction name="g"><variables>t</variables><expression>2*(</expression>'
+            "</ExpressionBasedFunction>",
+            "OSIM606",
+        ),
+    )
+    cases = []
+    for function, code in faults:
+        for enabled, applied, verdict in (("true", "true", FAILS), ("false", "true", RUNS), ("true", "false", FAILS)):
+            text = small_model(forces=actuator.format(applied), controllers=controller.format(enabled, function))
+            cases.append(Case(f"{code}: controller {enabled}, actuator {applied}", text, code, verdict))
+        for applied, verdict in (("true", FAILS), ("false", RUNS)):
+            text = small_model(forces=prescribed_force.format(applied, 3 * function))
+            cases.append(Case(f"{code}: force {applied}", text, code, verdict))
+    for formula, applied, verdict in (
+        ("1*x", "true", FAILS),
+        ("1*x", "false", RUNS),
+        ("2*(", "false", FAILS),
+    ):
+        force = _tag("ExpressionBasedCoordinateForce", appliesForce=applied, coordinate="q", expression=formula)
+        cases.append(Case(f"{formula}: force {applied}", small_model(forces=force), "OSIM606", verdict))
+    return cases
+
+
 def texts() -> list[Case]:
     """Return values in CDATA sections, and instructions and comments beside values."""
 
@@ -536,6 +581,7 @@ CASES = [
     *contradictions(),
     *cables(),
     *functions(),
+    *unused(),
     *texts(),
     *frames(),
     *poses(),

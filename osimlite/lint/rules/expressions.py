@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from osimlite.errors import ModelError
-from osimlite.lint.engine import ERROR, FindingSink, rule
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.rules.functions import UNUSED, is_unused
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
+from osimlite.schema.forces import Force
 
 _BUSHING_VARIABLES = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
 _BUSHING_PROPERTIES = tuple(f"{letter}{axis}_expression" for letter in ("M", "F") for axis in ("x", "y", "z"))
@@ -30,8 +32,9 @@ def broken_expression(subject: Subject, report: FindingSink) -> None:
     is not.
 
     OpenSim refuses the model where the formula is wrong, and fails at the first acceleration where
-    a variable is unknown. Formulas know + - * / ^, functions such as sin, sqrt, exp, min, step, and
-    after a semicolon definitions as in `k*q; k=100`. There is no pi and no `**`.
+    a variable is unknown; if what has the formula is off, it never gets there (a warning). Formulas
+    know + - * / ^, functions such as sin, sqrt, exp, min, step, and after a semicolon definitions as
+    in `k*q; k=100`. There is no pi and no `**`. What drops out needs no value: `0*x` is 0.
 
     ```xml
       <ExpressionBasedCoordinateForce name="spring">
@@ -43,7 +46,7 @@ def broken_expression(subject: Subject, report: FindingSink) -> None:
     """
     for item, tag, variables in _formulas(subject):
         # Few models have formulas, and reading them takes the kernels.
-        from osimlite.multibody.formula import Formula
+        from osimlite.multibody.formula import Formula, UnknownVariableError
 
         text = getattr(item, tag)
         try:
@@ -51,11 +54,15 @@ def broken_expression(subject: Subject, report: FindingSink) -> None:
         except ModelError as error:
             reason = error.message.removeprefix(f"it is '{text}': ")
             shown = f"'{text}'" if text else "empty"
+            # OpenSim reads the formula of a force that is off, and does not compute it.
+            is_read = isinstance(item, Force) and not isinstance(error, UnknownVariableError)
+            is_off = is_unused(subject, item) and not is_read
             report(
                 f"{tag} of {subject.called_with(item) if not item.name else called(item)} is "
-                f"{shown}: {reason}; OpenSim cannot compute it",
+                f"{shown}: {reason}; {UNUSED if is_off else 'OpenSim cannot compute it'}",
                 item,
                 tag=tag,
+                severity=WARNING if is_off else None,
             )
 
 

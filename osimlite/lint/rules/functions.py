@@ -10,7 +10,9 @@ from osimlite.lint.axes import axes_of
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
-from osimlite.schema.base import Object
+from osimlite.schema.base import Component, Object
+from osimlite.schema.controllers import Controller
+from osimlite.schema.forces import Force
 from osimlite.schema.functions import (
     Function,
     FunctionSet,
@@ -38,7 +40,8 @@ def unsorted_abscissae(subject: Subject, found: FindingSink) -> None:
 
     A GCVSpline is refused. A SimmSpline divides by the difference without a word and gives values in the millions;
     piecewise functions take the wrong piece. A moment arm or a moving point is then anywhere. Where the same point
-    stands twice, a SimmSpline has no slope (a warning).
+    stands twice, a SimmSpline has no slope (a warning). What is off, a controller or a force, never computes its
+    functions (a warning).
 
     ```xml
       <Coordinate name="knee_angle">
@@ -55,10 +58,19 @@ def unsorted_abscissae(subject: Subject, found: FindingSink) -> None:
             before, here = function.x[index - 1], function.x[index]
             if here < before or (strictly and here == before):
                 refused = isinstance(function, GCVSpline)
+                is_off = is_unused(subject, function)
                 level = (
                     here == before and not refused and function.y[index - 1 : index] == function.y[index : index + 1]
                 )
-                fate = "OpenSim refuses it" if refused else "it is level there" if level else "its values are wrong"
+                fate = (
+                    UNUSED
+                    if is_off
+                    else "OpenSim refuses it"
+                    if refused
+                    else "it is level there"
+                    if level
+                    else "its values are wrong"
+                )
                 relation = "repeats" if here == before else "is smaller than"
                 word, nth = subject.word_at(function, "x", index)
                 found(
@@ -68,7 +80,7 @@ def unsorted_abscissae(subject: Subject, found: FindingSink) -> None:
                     tag="x",
                     word=word,
                     nth=nth,
-                    severity=WARNING if level else None,
+                    severity=WARNING if level or is_off else None,
                 )
                 if not level:
                     break
@@ -96,12 +108,13 @@ def unequal_points(subject: Subject, found: FindingSink) -> None:
         xs, ys = len(function.x), len(function.y)
         if xs == ys:
             continue
-        fate = "OpenSim reads beyond the end of the list" if ys < xs else "the rest is ignored"
+        is_off = is_unused(subject, function)
+        fate = UNUSED if is_off else "OpenSim reads beyond the end of the list" if ys < xs else "the rest is ignored"
         found(
             f"{subject.called_with(function)} has {xs} x and {ys} y: {fate}",
             function,
             tag="y",
-            severity=None if ys < xs else WARNING,
+            severity=WARNING if is_off or ys > xs else None,
         )
 
 
@@ -122,22 +135,31 @@ def too_few_points(subject: Subject, found: FindingSink) -> None:
     ```
     """
     for function in _tabulated(subject):
-        least = 1
+        least, is_off = 1, is_unused(subject, function)
+        severity = WARNING if is_off else None
         if isinstance(function, SimmSpline):
             least = 2
         elif isinstance(function, GCVSpline):
             least = 2 * function.half_order
         if isinstance(function, GCVSpline) and function.half_order < 1:
             given = str(function.half_order) if "half_order" in function.model_fields_set else "not given"
+            fate = UNUSED if is_off else "OpenSim refuses it"
             found(
-                f"half_order of {subject.called_with(function)} is {given}: OpenSim refuses it; 2 is a cubic spline",
+                f"half_order of {subject.called_with(function)} is {given}: {fate}; 2 is a cubic spline",
                 function,
                 tag="half_order",
+                severity=severity,
             )
         elif len(function.x) < least:
             fate = "OpenSim refuses it" if isinstance(function, GCVSpline) else "it has no value"
+            fate = UNUSED if is_off else fate
             given = counted(len(function.x), "point")
-            found(f"{subject.called_with(function)} has {given} and needs {least}: {fate}", function, tag="x")
+            found(
+                f"{subject.called_with(function)} has {given} and needs {least}: {fate}",
+                function,
+                tag="x",
+                severity=severity,
+            )
 
 
 @rule("OSIM604", "coefficient-count", severity=WARNING)
@@ -162,22 +184,26 @@ def coefficient_count(subject: Subject, found: FindingSink) -> None:
     """
     for function in subject.each(LinearFunction):
         if not function.coefficients:
+            is_off = is_unused(subject, function)
+            fate = UNUSED if is_off else "OpenSim crashes when it needs a value"
             found(
-                f"{subject.called_with(function)} has no coefficients: OpenSim crashes when it needs a value",
+                f"{subject.called_with(function)} has no coefficients: {fate}",
                 function,
                 tag="coefficients",
-                severity=ERROR,
+                severity=WARNING if is_off else ERROR,
             )
     for polynomial in subject.each(MultivariatePolynomialFunction):
         dimension, order, given = polynomial.dimension, polynomial.order, len(polynomial.coefficients)
         wanted = comb(dimension + order, order) if 0 <= dimension < 100 and 0 <= order < 100 else given
         if given != wanted:
+            is_off = is_unused(subject, polynomial)
+            fate = UNUSED if is_off else "OpenSim fails when it needs a value"
             found(
                 f"{subject.called_with(polynomial)} has {counted(given, 'coefficient')}; "
-                f"{counted(dimension, 'variable')} to order {order} need {wanted}: OpenSim fails when it needs a value",
+                f"{counted(dimension, 'variable')} to order {order} need {wanted}: {fate}",
                 polynomial,
                 tag="coefficients",
-                severity=ERROR,
+                severity=WARNING if is_off else ERROR,
             )
     for holder, names, function in _linear(subject):
         given, wanted = len(function.coefficients), names + 1
@@ -280,9 +306,12 @@ def missing_function(subject: Subject, found: FindingSink) -> None:
                     found(f"{called(item)} has no {name}: {refused}", item, tag=name)
     for function in subject.each(MultiplierFunction):
         if function.function is None:
+            is_off = is_unused(subject, function)
+            fate = UNUSED if is_off else "OpenSim fails when it needs a value"
             found(
-                f"{subject.called_with(function)} has no function to multiply: OpenSim fails when it needs a value",
+                f"{subject.called_with(function)} has no function to multiply: {fate}",
                 function,
+                severity=WARNING if is_off else None,
             )
 
 
@@ -316,6 +345,26 @@ def _linear(subject: Subject) -> Iterator[tuple[Object, int, LinearFunction]]:
             function = function.function
         if isinstance(function, LinearFunction) and (function._index is not None or subject.source is None):
             yield holder, count, function
+
+
+UNUSED: Final = "what it belongs to is off, and OpenSim does not compute it"
+
+
+def is_unused(subject: Subject, function: Object) -> bool:
+    """Return whether OpenSim never computes a function, since what it belongs to is off.
+
+    That is a force that is not applied or a controller that is not enabled. Functions of coordinates and
+    constraints are made with the system, even where they are off, and the integrator asks each enabled
+    controller, even if no actuator does.
+    """
+    item: Component | None = subject.owner(function)
+    while item is not None:
+        if isinstance(item, Force):
+            return not item.appliesForce
+        if isinstance(item, Controller):
+            return not item.enabled
+        item = subject.tree.parent_of(item)
+    return False
 
 
 def _tabulated(subject: Subject) -> Iterator[Tabulated]:
