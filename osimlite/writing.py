@@ -19,12 +19,14 @@ import os
 import re
 import stat
 import sys
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
 from osimlite.errors import OsimliteError
+from osimlite.pruning import MARKER, is_due, prune_cache
 from osimlite.reading import read_at_most
 from osimlite.records import dataclass
 
@@ -149,10 +151,25 @@ def user_cache_folder() -> Path | None:
 
 
 def write_cached(path: Path, content: str | bytes) -> None:
-    """Write an entry of a cache, and make its folder; the entry is left out if that is not possible."""
+    """Write an entry of a cache, and make its folder; the entry is left out if that is not possible.
+
+    Once a day entries that were not used for long are removed first.
+    """
     with suppress(OSError, OsimliteError):
         path.parent.mkdir(parents=True, exist_ok=True)
+        folder = user_cache_folder()
+        if folder is not None and folder in path.parents:
+            _prune_daily(folder)
         write_into(path.parent, path.name, content)
+
+
+def _prune_daily(folder: Path) -> None:
+    """Remove old entries of the user's cache, unless this was done in the last day."""
+    now = time.time()
+    if is_due(folder, now):
+        # The mark comes first: processes that start meanwhile need not do the same.
+        write_into(folder, MARKER, "")
+        prune_cache(folder, now)
 
 
 def open_to_append(path: Path) -> BinaryIO:

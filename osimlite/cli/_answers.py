@@ -14,6 +14,7 @@ from osimlite.errors import OsimliteError
 from osimlite.files import read_file
 from osimlite.lint.cache import key_of
 from osimlite.lint.config import Config
+from osimlite.pruning import mark_used
 from osimlite.writing import user_cache_folder, write_cached
 
 
@@ -35,6 +36,7 @@ def answered(question: str, file: str, data: bytes, find: Callable[[], tuple[str
     with suppress(OsimliteError, ValueError, RecursionError):
         match json.loads(read_file(kept)):
             case [known, str(answer)] if known == key:
+                mark_used(kept)
                 return answer
     answer, lasts = find()
     if lasts:

@@ -21,6 +21,7 @@ from osimlite._require import absent
 from osimlite.errors import OsimliteError
 from osimlite.files import read_file, stamped
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Report, Severity
+from osimlite.pruning import mark_used
 from osimlite.writing import write_cached
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ class Cache:
                         if text != text_of(read_file(file)):
                             return None
                         self.put(file, key, text, known, stamps, now)
+                    mark_used(self._entry(file))
                     return known
         except (OsimliteError, OSError, ValueError, TypeError, RecursionError):
             pass

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from osimlite.errors import OsimliteError
 from osimlite.files import read_file
 from osimlite.lint.measures import Measures, of_owners
+from osimlite.pruning import mark_used
 from osimlite.schema.specs import lineage
 from osimlite.writing import write_cached
 
@@ -92,6 +93,7 @@ def recall(parts: Parts, folder: Path | None) -> Known | None:
             known = TypeAdapter(Known).validate_json(read_file(_file(folder, parts)), strict=True)
         except (OsimliteError, ValidationError):
             return None
+        mark_used(_file(folder, parts))
         remembered[parts.rest] = known
     return known
 
