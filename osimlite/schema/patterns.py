@@ -4,8 +4,9 @@ Moco matches the names of states and controls as wholes by `std::regex` (ECMAScr
 backtracks, as Python's `re` and `std::regex` do, takes exponential time for patterns such as
 `(.*)*(.*)*!`, and a study may come from a stranger. This one follows all alternatives at once
 (K. Thompson, "Regular expression search algorithm", CACM 11(6), 1968): the time is at most the product
-of the lengths of the name and of the pattern. It has ECMAScript's syntax but for what needs memory or
-looks around: back references, `(?=`, `(?!` and `\\b`.
+of the lengths of the name and of the pattern. Look-ahead assertions keep to that: one pass from the end
+of the name finds all places where an assertion holds. It has ECMAScript's syntax but for back
+references, which need memory.
 """
 
 from __future__ import annotations
@@ -53,7 +54,8 @@ class _State:
     """One state of the automaton: it reads a character, or leads on without one."""
 
     test: CharacterTest | None = None
-    anchor: str = ""  # "^" or "$": whether it leads on at the start or the end of the name alone
+    anchor: str = ""  # "^", "$", "b", "B", "=" or "!": it leads on only where that holds
+    inside: tuple[int, int] = (0, 0)  # of a look-ahead assertion, the first and the last state of its pattern
     following: list[int] = field(default_factory=list)
 
 
@@ -70,31 +72,80 @@ class Pattern:
         self._states, self._first, self._final = compiler.states, compiler.first, compiler.final
         # What each character leads to from sets of states: the names of a model begin alike.
         self._steps: dict[tuple[frozenset[int], str, bool], frozenset[int]] = {}
+        self._looks_around = any(state.anchor not in ("", "^", "$") for state in self._states)
+        self._sources: list[list[int]] = [[] for _ in self._states]
+        for number, state in enumerate(self._states):
+            for following in state.following:
+                self._sources[following].append(number)
 
     def fullmatch(self, name: str) -> bool:
         """Return whether the whole of a name matches."""
-        reached = self._lead_on([self._first], at_start=True, at_end=not name)
+        known: dict[int, list[set[int]]] = {}
+        reached = self._lead_on([self._first], name, 0, known)
         for index, character in enumerate(name):
             key = reached, character, index == len(name) - 1
-            if key not in self._steps:
+            following = None if self._looks_around else self._steps.get(key)
+            if following is None:
                 states = [self._states[number] for number in reached]
                 read = [state.following[0] for state in states if state.test is not None and state.test(character)]
-                self._steps[key] = self._lead_on(read, at_start=False, at_end=key[2])
-            reached = self._steps[key]
+                following = self._lead_on(read, name, index + 1, known)
+                if not self._looks_around:
+                    self._steps[key] = following
+            reached = following
         return self._final in reached
 
-    def _lead_on(self, numbers: Iterable[int], *, at_start: bool, at_end: bool) -> frozenset[int]:
-        """Return some states and all that they lead to without a character."""
+    def _lead_on(
+        self, numbers: Iterable[int], name: str, index: int, known: dict[int, list[set[int]]]
+    ) -> frozenset[int]:
+        """Return some states and all that they lead to without a character, before a character of a name."""
         waiting, reached = [*numbers], set[int]()
         while waiting:
             number = waiting.pop()
             if number in reached:
                 continue
             reached.add(number)
-            state = self._states[number]
-            if state.test is None and {"": True, "^": at_start, "$": at_end}[state.anchor]:
-                waiting += state.following
+            if self._states[number].test is None and self._holds(number, name, index, known):
+                waiting += self._states[number].following
         return frozenset(reached)
+
+    def _holds(self, number: int, name: str, index: int, known: dict[int, list[set[int]]]) -> bool:
+        """Return whether a state that reads no character leads on before a character of a name."""
+        state = self._states[number]
+        match state.anchor:
+            case "":
+                return True
+            case "^":
+                return index == 0
+            case "$":
+                return index == len(name)
+            case "b" | "B":
+                before, after = name[max(index - 1, 0) : index] in _WORD, name[index : index + 1] in _WORD
+                return (before != after) == (state.anchor == "b")
+        if number not in known:
+            known[number] = self._find_matching_starts(state.inside[1], name, known)
+        return (state.inside[0] in known[number][index]) == (state.anchor == "=")
+
+    def _find_matching_starts(self, final: int, name: str, known: dict[int, list[set[int]]]) -> list[set[int]]:
+        """Return, before each character of a name and at its end, the states that lead to a final one."""
+        result: list[set[int]] = [set() for _ in range(len(name) + 1)]
+        for index in range(len(name), -1, -1):
+            waiting = [final]
+            for reached in result[index + 1] if index < len(name) else ():
+                for source in self._sources[reached]:
+                    test = self._states[source].test
+                    if test is not None and test(name[index]):
+                        waiting.append(source)
+            while waiting:
+                number = waiting.pop()
+                if number in result[index]:
+                    continue
+                result[index].add(number)
+                waiting += (
+                    source
+                    for source in self._sources[number]
+                    if self._states[source].test is None and self._holds(source, name, index, known)
+                )
+        return result
 
 
 class _Compiler:
@@ -232,6 +283,8 @@ class _Compiler:
             state = self._add(self._bracket())
         elif character == ".":
             state = self._add(lambda each: each not in "\n\r\u2028\u2029")
+        elif character == "\\" and self._peek() in ("b", "B"):
+            return self._assert(self._take())
         elif character == "\\":
             state = self._add(self._escape())
         else:
@@ -241,8 +294,11 @@ class _Compiler:
         return state, after
 
     def _group(self) -> tuple[int, int]:
+        assertion = ""
         if self._takes("?") and not self._takes(":"):
-            raise UnsupportedPatternError("'(?=' and '(?!' are not supported")
+            assertion = self._take()
+            if assertion not in "=!":
+                raise PatternError(f"'(?{assertion}' begins no group; OpenSim knows '(?:', '(?=' and '(?!'")
         self.level += 1
         if self.level > MAX_NESTING:
             raise UnsupportedPatternError(f"groups nest more than {MAX_NESTING} levels deep")
@@ -250,7 +306,14 @@ class _Compiler:
         self.level -= 1
         if not self._takes(")"):
             raise PatternError("a ')' is missing")
-        return part
+        return self._assert(anchor=assertion, inside=part) if assertion else part
+
+    def _assert(self, anchor: str, inside: tuple[int, int] = (0, 0)) -> tuple[int, int]:
+        """Return a part that reads nothing, and that leads on only where an assertion holds."""
+        state, after = self._add(anchor=anchor), self._add()
+        self.states[state].inside = inside
+        self._link(state, after)
+        return state, after
 
     def _escape(self) -> CharacterTest:
         characters, is_negated = self._read_escaped_set()
