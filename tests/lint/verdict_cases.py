@@ -441,6 +441,15 @@ def unused() -> list[Case]:
         for applied, verdict in (("true", FAILS), ("false", RUNS)):
             text = small_model(forces=prescribed_force.format(applied, 3 * function))
             cases.append(Case(f"{code}: force {applied}", text, code, verdict))
+    length = (
+        '<PathSpring name="f"><appliesForce>false</appliesForce><FunctionBasedPath name="path">'
+        "<coordinate_paths>/jointset/j/q</coordinate_paths><length_function>{}</length_function></FunctionBasedPath>"
+        "<resting_length>1</resting_length><stiffness>1</stiffness><dissipation>0</dissipation></PathSpring>"
+    )
+    # OpenSim makes the functions of such a path as it reads it.
+    for function, code in faults[:3]:
+        text = small_model(forces=length.format(function))
+        cases.append(Case(f"{code}: length of a path that is off", text, code, FAILS))
     for formula, applied, verdict in (
         ("1*x", "true", FAILS),
         ("1*x", "false", RUNS),

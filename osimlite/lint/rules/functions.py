@@ -27,6 +27,7 @@ from osimlite.schema.functions import (
     Sine,
     StepFunction,
 )
+from osimlite.schema.paths import FunctionBasedPath
 from osimlite.text import counted
 
 Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstantFunction
@@ -38,10 +39,10 @@ def unsorted_abscissae(subject: Subject, found: FindingSink) -> None:
 
     Reports the first x that is smaller than the one before it, and of splines also the first that is equal to it.
 
-    A GCVSpline is refused. A SimmSpline divides by the difference without a word and gives values in the millions;
-    piecewise functions take the wrong piece. A moment arm or a moving point is then anywhere. Where the same point
-    stands twice, a SimmSpline has no slope (a warning). What is off, a controller or a force, never computes its
-    functions (a warning).
+    A GCVSpline is refused, or OpenSim fails when a force or a controller asks for its value. A SimmSpline divides by
+    the difference without a word and gives values in the millions; piecewise functions take the wrong piece. A moment
+    arm or a moving point is then anywhere. Where the same point stands twice, a SimmSpline has no slope (a warning).
+    What is off, a controller or a force, never computes its functions (a warning).
 
     ```xml
       <Coordinate name="knee_angle">
@@ -143,7 +144,7 @@ def too_few_points(subject: Subject, found: FindingSink) -> None:
             least = 2 * function.half_order
         if isinstance(function, GCVSpline) and function.half_order < 1:
             given = str(function.half_order) if "half_order" in function.model_fields_set else "not given"
-            fate = UNUSED if is_off else "OpenSim refuses it"
+            fate = _describe_refusal(subject, function)
             found(
                 f"half_order of {subject.called_with(function)} is {given}: {fate}; 2 is a cubic spline",
                 function,
@@ -151,8 +152,9 @@ def too_few_points(subject: Subject, found: FindingSink) -> None:
                 severity=severity,
             )
         elif len(function.x) < least:
-            fate = "OpenSim refuses it" if isinstance(function, GCVSpline) else "it has no value"
-            fate = UNUSED if is_off else fate
+            fate = "it has no value"
+            if is_off or isinstance(function, GCVSpline):
+                fate = _describe_refusal(subject, function)
             given = counted(len(function.x), "point")
             found(
                 f"{subject.called_with(function)} has {given} and needs {least}: {fate}",
@@ -357,14 +359,28 @@ def is_unused(subject: Subject, function: Object) -> bool:
     constraints are made with the system, even where they are off, and the integrator asks each enabled
     controller, even if no actuator does.
     """
+    user = _find_user(subject, function)
+    if isinstance(user, Force):
+        return not user.appliesForce
+    return isinstance(user, Controller) and not user.enabled
+
+
+def _find_user(subject: Subject, function: Object) -> Force | Controller | None:
+    """Return what asks for the values of a function; None if it is made with the model or the system."""
     item: Component | None = subject.owner(function)
-    while item is not None:
-        if isinstance(item, Force):
-            return not item.appliesForce
-        if isinstance(item, Controller):
-            return not item.enabled
-        item = subject.tree.parent_of(item)
-    return False
+    while item is not None and not isinstance(item, Force | Controller):
+        # OpenSim makes the functions of such a path as it reads it, whether the force is applied or not.
+        item = None if isinstance(item, FunctionBasedPath) else subject.tree.parent_of(item)
+    return item
+
+
+def _describe_refusal(subject: Subject, function: Object) -> str:
+    """Return what OpenSim does with a spline that it cannot make."""
+    if is_unused(subject, function):
+        return UNUSED
+    # What a force or a controller asks for is made at the first acceleration.
+    is_late = _find_user(subject, function) is not None
+    return "OpenSim fails when it needs a value" if is_late else "OpenSim refuses it"
 
 
 def _tabulated(subject: Subject) -> Iterator[Tabulated]:
