@@ -80,7 +80,7 @@ try_python() {
     install "$work/$1" --only-binary :all: --no-binary osimlite -e '.[dev]'
     "$work/$1/bin/osimlite" demo -o "$work/demo-$1" </dev/null
     "$work/$1/bin/pytest" -n1 tests/test_readme.py tests/test_windows.py tests/simulation/test_run.py \
-        tests/simulation/test_compiled.py tests/document/upgrade tests/document/test_{any_model,plugins}.py
+        tests/simulation/test_compiled.py tests/io/document/upgrade tests/io/document/test_{any_model,plugins}.py
     rm -rf "${work:?}/$1"
 }
 

@@ -1,4 +1,4 @@
-"""Walks by OpenSim itself: foot strikes from its own contact forces, judged by the rules of `osimlite.gait`.
+"""Walks by OpenSim itself: foot strikes from its own contact forces, judged by the rules of `osimlite.studies.gait`.
 
 ``python benchmarks/_opensim_walks.py FILE SECONDS ACCURACY`` makes one and prints it as JSON, which is how several walk
 at a time.
@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import osimlite
-from osimlite.gait.foot_contacts import find_footing
-from osimlite.gait.steps import Scuff, Step, Walk, along_slope, follow
 from osimlite.simulation import Simulation
+from osimlite.studies.gait.foot_contacts import find_footing
+from osimlite.studies.gait.steps import Scuff, Step, Walk, along_slope, follow
 
 
 class Order(NamedTuple):

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.files import TABLES
+from osimlite.base.files import TABLES
 from osimlite.lint import Config, Finding
 from osimlite.lint.many import check_files
 from osimlite.lint.suffixes import project_files

@@ -25,7 +25,7 @@ import numpy as np
 
 import osimlite
 from adoption import KITS, git
-from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.io.tables.storage import StoTable, read_sto
 
 MASS, HEIGHT = 75.0, 1.8
 """Of the subject, kg and m."""

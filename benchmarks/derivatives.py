@@ -4,7 +4,7 @@
 many instructions the derivative of the state takes, seconds to make the functions; then the largest difference, at
 random states and controls, of that derivative from the kernels', of the Jacobian and of the Hessian of a random
 combination from those that the kernels have themselves when they run on numbers that carry derivatives
-(`tests/backends/jets.py`), each over the size of the numbers that it is made of; and microseconds of machine code,
+(`tests/derivatives/jets.py`), each over the size of the numbers that it is made of; and microseconds of machine code,
 value, Jacobian and Hessian. With ``--opensim`` OpenSim's value, and a Jacobian by forward differences, in microseconds.
 """
 
@@ -49,7 +49,7 @@ def measured(path: Path) -> dict[str, Any]:
     import numpy as np
 
     import osimlite
-    from tests.backends.machine import Beside
+    from tests.derivatives.machine import Beside
 
     before = time.perf_counter()
     both = Beside(osimlite.read(path))

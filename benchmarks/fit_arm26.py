@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import least_squares  # type: ignore[import-untyped]
 
 import osimlite
-from osimlite.sweep.properties import places
+from osimlite.simulation.properties import places
 
 MODEL = Path(__file__).resolve().parents[2] / "shared/corpus/models/m0001/arm26.osim"
 MUSCLES = "TRIlong", "BIClong", "BRA"

@@ -25,7 +25,7 @@ import osimlite
 from _corpus import CORPUS
 from osimlite.fitting.orientation_data import OrientationData
 from osimlite.fitting.sensors import place_sensors
-from osimlite.multibody.spatial import rotation_xyz
+from osimlite.mechanics.multibody.spatial import rotation_xyz
 
 AIM = 1e-3
 """What the worst frame may take, s."""

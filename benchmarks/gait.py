@@ -20,12 +20,12 @@ from rich.table import Table
 
 import osimlite
 from _opensim_walks import Order, opensim_walks
-from osimlite.gait.basin import perturbed, walks_from
-from osimlite.gait.cycle import find_cycle
-from osimlite.gait.stepmap import StepMap
-from osimlite.gait.steps import Walk, walk_many
 from osimlite.models.source import make_model, parameters_of
 from osimlite.simulation import Simulation
+from osimlite.studies.gait.basin import perturbed, walks_from
+from osimlite.studies.gait.cycle import find_cycle
+from osimlite.studies.gait.stepmap import StepMap
+from osimlite.studies.gait.steps import Walk, walk_many
 
 TO = 60.0
 CONFIRMED = {"steady-walker": 1e-8, "human-walker": 1e-6, "furthest-walker": 1e-8}

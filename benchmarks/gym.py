@@ -14,7 +14,7 @@ import gymnasium
 import numpy as np
 
 import osimlite.gym
-from osimlite._cores import cores
+from osimlite.base.cores import cores
 
 STEPS = 100
 

@@ -24,11 +24,11 @@ from rich.table import Table
 
 import osimlite
 from _pair import pair, report
+from osimlite.io.tables.storage import write_sto
 from osimlite.models.jumper import CONTROLS, MUSCLES, drive, jumper
 from osimlite.simulation import Simulation
-from osimlite.simulation.files.storage import write_sto
-from osimlite.sweep.optimize import Objective, optimize
-from osimlite.sweep.plan import plan
+from osimlite.studies.sweep.optimize import Objective, optimize
+from osimlite.studies.sweep.plan import plan
 
 FOOT = "(pelvis_tilt + hip_flexion_r + knee_angle_r + ankle_angle_r)"
 AHEAD = "(center_of_mass_X - foot_r_X)"

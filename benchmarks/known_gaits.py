@@ -16,7 +16,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from osimlite.kernels.record import STOPPED
+from osimlite.mechanics.kernels.record import STOPPED
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import HuntCrossleyForce

@@ -29,7 +29,7 @@ from rich.table import Table
 import osimlite
 from osimlite import Body, Coordinate, Model, PinJoint
 from osimlite.errors import OsimliteError
-from osimlite.multibody import Mechanism, build_mechanism
+from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.schema.forces import Force
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines import engine_factory

@@ -22,7 +22,16 @@ from rich.table import Table
 
 import osimlite
 from _pair import pair, report
-from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, FreeJoint, HuntCrossleyForce, Model, PinJoint
+from osimlite import (
+    Body,
+    ContactHalfSpace,
+    ContactSphere,
+    Coordinate,
+    FreeJoint,
+    HuntCrossleyForce,
+    Model,
+    PinJoint,
+)
 from osimlite.errors import OsimliteError
 from osimlite.schema.forces import Force
 from osimlite.schema.muscles import Muscle

@@ -22,12 +22,12 @@ from rich.console import Console
 import osimlite
 from _corpus import CORPUS
 from _pair import pair, report
-from osimlite.sweep.plan import plan
-from osimlite.sweep.run import sweep
-from osimlite.sweep.runner import Runner
-from osimlite.sweep.sampling import samples
-from osimlite.sweep.variables import Floats
-from osimlite.sweep.variants import Variants
+from osimlite.studies.sweep.plan import plan
+from osimlite.studies.sweep.run import sweep
+from osimlite.studies.sweep.runner import Runner
+from osimlite.studies.sweep.sampling import samples
+from osimlite.studies.sweep.variables import Floats
+from osimlite.studies.sweep.variants import Variants
 
 MODEL = CORPUS.parent / "models" / "m0005" / "gait10dof18musc.osim"
 TO, NODES, RUNS, ROUNDS, HEIGHT = 0.5, 6, 100, 3, "end(center_of_mass_Y)"

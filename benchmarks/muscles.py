@@ -30,12 +30,12 @@ from rich.table import Table
 import osimlite
 from _corpus import CORPUS
 from _pair import Pair, pair, report
-from osimlite.kernels.layout import STAGE
+from osimlite.mechanics.kernels.layout import STAGE
 from osimlite.simulation import Simulation
 from osimlite.simulation.system import System
-from osimlite.sweep.plan import plan
-from osimlite.sweep.runner import Runner
-from osimlite.sweep.sampling import samples
+from osimlite.studies.sweep.plan import plan
+from osimlite.studies.sweep.runner import Runner
+from osimlite.studies.sweep.sampling import samples
 
 REAL = {
     "arm26": "m0001",

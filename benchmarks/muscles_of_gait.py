@@ -18,8 +18,8 @@ import numpy as np
 
 import osimlite
 from _moco_studies import CORE, GAIT, TESTS, gait_tool, sources
-from osimlite.modifying.processing import processed
-from osimlite.simulation.files.storage import StoTable, read_sto, write_sto
+from osimlite.fitting.modifying.processing import processed
+from osimlite.io.tables.storage import StoTable, read_sto, write_sto
 
 THEIRS = "import opensim; opensim.Logger.setLevelString('Off'); opensim.AnalyzeTool('setup.xml').run()"
 START, END = 0.45, 1.0

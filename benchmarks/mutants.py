@@ -29,7 +29,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = (
-    "schema", "document", "lint", "multibody", "kernels", "forces", "simulation", "tools", "optimal", "translate"
+    "schema", "io", "lint", "mechanics", "simulation", "tools", "optimal", "translate"
 )  # fmt: skip
 COPIED = ("osimlite", "tests", "fixtures", "schemas", "benchmarks", "docs", "pyproject.toml", "README.md", "editors")
 OPERATORS: dict[type[ast.AST], tuple[str, str]] = {

@@ -26,8 +26,8 @@ from statistics import median
 
 import osimlite
 from _moco_studies import CORE, LONG, STUDIES, kept
+from osimlite.base.records import replace
 from osimlite.moco import MocoTrajectory
-from osimlite.records import replace
 
 OURS = """
 import json, os, sys, time

@@ -35,11 +35,11 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
-from osimlite.multibody import build_mechanism
-from osimlite.sweep.optimize import Objective, optimize
-from osimlite.sweep.plan import plan
-from osimlite.sweep.search import Search, cma
-from osimlite.sweep.variables import Floats, Range
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.studies.sweep.optimize import Objective, optimize
+from osimlite.studies.sweep.plan import plan
+from osimlite.studies.sweep.search import Search, cma
+from osimlite.studies.sweep.variables import Floats, Range
 
 MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
 JOINTS = ("LHip_rz", "RHip_rz", "LKnee_rz", "RKnee_rz")

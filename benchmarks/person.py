@@ -22,10 +22,10 @@ from osimlite.fitting.inverse_kinematics import marker_stations
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.person import Person
 from osimlite.fitting.scaling import scale_model
-from osimlite.multibody.spatial import Array
+from osimlite.io.tables.storage import read_sto
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.frames import Body
 from osimlite.schema.markers import Marker
-from osimlite.simulation.files.storage import read_sto
 
 NOISE, ELSEWHERE, FRAMES = 0.005, 0.015, 200
 BONY = "calc", "toe", "5meta", "ankle", "knee", "ASIS", "C7", "Shoulder", "elbow", "wrist"

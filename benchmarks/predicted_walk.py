@@ -69,7 +69,7 @@ def forward(osim: Any, model_file: Path, table: Any, to: float, strides: int = 1
 
 def main() -> None:
     """Print a table in Markdown."""
-    from osimlite.simulation.files.storage import read_sto
+    from osimlite.io.tables.storage import read_sto
 
     print("| mesh | intervals | all, s | after a step, off by | off by 0.001, at | 0.01 | 0.1 | falls |")
     print("|---|---|---|---|---|---|---|---|")

@@ -28,10 +28,10 @@ from osimlite.fitting.ik_tool import run_inverse_kinematics, tasks_of
 from osimlite.fitting.inverse_kinematics import marker_stations
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.scale_tool import run_scale
-from osimlite.multibody.constraints import Lock
-from osimlite.multibody.spatial import Array
+from osimlite.io.tables.storage import StoTable, read_sto
+from osimlite.mechanics.multibody.constraints import Lock
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.base import Object
-from osimlite.simulation.files.storage import StoTable, read_sto
 
 SECONDS, FRAMES = 150, 150
 """How long OpenSim may run, and how many frames are compared at most."""

@@ -15,8 +15,8 @@ import time
 from pathlib import Path
 
 import osimlite
-from osimlite.sweep.optimize import Objective, optimize
-from osimlite.sweep.plan import plan
+from osimlite.studies.sweep.optimize import Objective, optimize
+from osimlite.studies.sweep.plan import plan
 
 MODEL = Path(__file__).resolve().parents[2] / "shared/corpus/models/m0001/arm26.osim"
 MUSCLES = "TRIlong", "TRIlat", "TRImed", "BIClong", "BICshort", "BRA"

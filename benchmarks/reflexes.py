@@ -16,9 +16,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from osimlite.kernels.walks import FORCES
+from osimlite.mechanics.kernels.walks import FORCES
 from osimlite.models.walking import write_scenario
-from osimlite.reflexes.scenario import Scenario
+from osimlite.studies.reflexes.scenario import Scenario
 
 CANDIDATES, TIMES = 16, 3
 OPENSIM = """
@@ -57,7 +57,7 @@ def main(file: Path, seconds: float) -> None:
     scenario.walk(best, CANDIDATES, duration=0.1)
     alone, many, theirs = [], [], []
     with tempfile.TemporaryDirectory() as folder:
-        from osimlite.document.printer import write
+        from osimlite.io.document.printer import write
 
         model, given = Path(folder) / "model.osim", Path(folder) / "given.json"
         write(scenario.model, model)

@@ -29,10 +29,10 @@ from rich.table import Table
 
 import osimlite
 from _pair import pair, report
-from osimlite.sweep.plan import Plan, plan
-from osimlite.sweep.run import sweep
-from osimlite.sweep.runner import Runner
-from osimlite.sweep.sampling import samples
+from osimlite.studies.sweep.plan import Plan, plan
+from osimlite.studies.sweep.run import sweep
+from osimlite.studies.sweep.runner import Runner
+from osimlite.studies.sweep.sampling import samples
 
 MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
 VARY = {"RHip_rz": "20deg:40deg", "LHip_rz": "-20deg:0deg", "Pelvis_tx/speed": "0:1"}

@@ -32,10 +32,10 @@ from _corpus import CORPUS
 from _pair import Pair, _run, pair, pair_commands
 from osimlite.fitting.orientation_data import OrientationData
 from osimlite.fitting.sensors import place_sensors
-from osimlite.multibody.spatial import quaternion, rotation_xyz
-from osimlite.simulation.files.recorded import RecordedMotion
-from osimlite.simulation.files.storage import write_sto
-from osimlite.simulation.files.trc import write_trc
+from osimlite.io.tables.storage import write_sto
+from osimlite.io.tables.trc import write_trc
+from osimlite.mechanics.multibody.spatial import quaternion, rotation_xyz
+from osimlite.simulation.recorded_motion import RecordedMotion
 from validate import whole_process
 
 REFERENCE = CORPUS.parents[1] / "oracle" / "tools" / "reference"

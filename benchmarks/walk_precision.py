@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.models.walking import write_scenario
-from osimlite.reflexes.scenario import Scenario
 from osimlite.simulation.copies import Copies
+from osimlite.studies.reflexes.scenario import Scenario
 
 METHODS = {
     "euler2": (1e-2, 3e-3, 1e-3, 1e-4, 1e-5),

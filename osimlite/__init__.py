@@ -16,25 +16,24 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from osimlite.backends.functions import casadi as casadi
-    from osimlite.backends.linear import linearize as linearize
-    from osimlite.backends.sensitivity import sensitivity as sensitivity
-    from osimlite.backends.tangents import tangents as tangents
-    from osimlite.document.plugins import classes_in as classes_in
-    from osimlite.document.printer import to_text as to_text
-    from osimlite.document.printer import write as write
-    from osimlite.document.reader import read as read
-    from osimlite.document.reader import read_any as read_document
-    from osimlite.document.reader import read_text as read_text
+    from osimlite.derivatives.functions import casadi as casadi
+    from osimlite.derivatives.linear import linearize as linearize
+    from osimlite.derivatives.sensitivity import sensitivity as sensitivity
+    from osimlite.derivatives.tangents import tangents as tangents
     from osimlite.errors import OsimliteError as OsimliteError
     from osimlite.fitting.frame_solver import FrameSolver as FrameSolver
     from osimlite.fitting.inverse_kinematics import inverse_kinematics as inverse_kinematics
+    from osimlite.fitting.modifying.words import modify as modify
     from osimlite.fitting.person import fit as fit
     from osimlite.fitting.scale_tool import scale as scale
+    from osimlite.io.document.plugins import classes_in as classes_in
+    from osimlite.io.document.printer import to_text as to_text
+    from osimlite.io.document.printer import write as write
+    from osimlite.io.document.reader import read as read
+    from osimlite.io.document.reader import read_any as read_document
+    from osimlite.io.document.reader import read_text as read_text
     from osimlite.lint import validate as validate
-    from osimlite.modifying.words import modify as modify
-    from osimlite.multibody import build_mechanism as mechanism
-    from osimlite.reflexes.feedback import Feedback as Feedback
+    from osimlite.mechanics.multibody import build_mechanism as mechanism
     from osimlite.schema.model import Model as Model
     from osimlite.simulation import simulate as simulate
     from osimlite.simulation.muscle_curves import muscle_curves as muscle_curves
@@ -42,11 +41,12 @@ if TYPE_CHECKING:
     from osimlite.simulation.recorded import inverse_dynamics as inverse_dynamics
     from osimlite.simulation.recorded import kinematics as kinematics
     from osimlite.simulation.shared_forces import static_optimization as static_optimization
+    from osimlite.studies.reflexes.feedback import Feedback as Feedback
+    from osimlite.tools.report import report as report
     from osimlite.tools.running import run as run
     from osimlite.tools.trials.check import check_trial as check_trial
     from osimlite.translate import to_mjcf as to_mjcf
     from osimlite.translate import to_urdf as to_urdf
-    from osimlite.view.report import report as report
 
     # When the program runs, `__getattr__` makes the list, of the component classes too.
     __all__ = [
@@ -84,29 +84,29 @@ if TYPE_CHECKING:
     ]
 
 FUNCTIONS = {
-    "casadi": "osimlite.backends.functions",
-    "classes_in": "osimlite.document.plugins",
-    "read": "osimlite.document.reader",
-    "read_document": "osimlite.document.reader:read_any",
-    "read_text": "osimlite.document.reader",
-    "write": "osimlite.document.printer",
-    "to_text": "osimlite.document.printer",
+    "casadi": "osimlite.derivatives.functions",
+    "classes_in": "osimlite.io.document.plugins",
+    "read": "osimlite.io.document.reader",
+    "read_document": "osimlite.io.document.reader:read_any",
+    "read_text": "osimlite.io.document.reader",
+    "write": "osimlite.io.document.printer",
+    "to_text": "osimlite.io.document.printer",
     "validate": "osimlite.lint",
-    "Feedback": "osimlite.reflexes.feedback",
+    "Feedback": "osimlite.studies.reflexes.feedback",
     "FrameSolver": "osimlite.fitting.frame_solver",
     "inverse_kinematics": "osimlite.fitting.inverse_kinematics",
     "fit": "osimlite.fitting.person",
     "scale": "osimlite.fitting.scale_tool",
-    "linearize": "osimlite.backends.linear",
-    "tangents": "osimlite.backends.tangents",
-    "sensitivity": "osimlite.backends.sensitivity",
-    "modify": "osimlite.modifying.words",
-    "mechanism": "osimlite.multibody:build_mechanism",
+    "linearize": "osimlite.derivatives.linear",
+    "tangents": "osimlite.derivatives.tangents",
+    "sensitivity": "osimlite.derivatives.sensitivity",
+    "modify": "osimlite.fitting.modifying.words",
+    "mechanism": "osimlite.mechanics.multibody:build_mechanism",
     "to_mjcf": "osimlite.translate",
     "to_urdf": "osimlite.translate",
     "muscle_curves": "osimlite.simulation.muscle_curves",
     "paths": "osimlite.simulation.paths",
-    "report": "osimlite.view.report",
+    "report": "osimlite.tools.report",
     "run": "osimlite.tools.running",
     "check_trial": "osimlite.tools.trials.check",
     "inverse_dynamics": "osimlite.simulation.recorded",
@@ -134,8 +134,8 @@ def __getattr__(name: str) -> Any:
 
             if name.isidentifier() and find_spec(f"{__name__}.{name}"):
                 return import_module(f"{__name__}.{name}")
+            from osimlite.base.text import did_you_mean
             from osimlite.schema.registry import MODULES
-            from osimlite.text import did_you_mean
 
             near = did_you_mean(name, [*FUNCTIONS, *MODULES])
         raise AttributeError(f"module 'osimlite' has no attribute '{name}'{near}")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any, ClassVar
 
-from osimlite.text import brief, visible
+from osimlite.base.text import brief, visible
 
 
 class OsimliteError(Exception):

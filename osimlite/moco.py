@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from osimlite._lazy import imported_when_used
+from osimlite.base.lazy import imported_when_used
 
 if TYPE_CHECKING:
     from osimlite.optimal.inverse import inverse as inverse

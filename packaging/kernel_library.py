@@ -27,13 +27,19 @@ from zlib import crc32
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from osimlite.codegen import toolchain  # noqa: E402
-from osimlite.codegen.processor import processor_features  # noqa: E402
+from osimlite.mechanics.codegen import toolchain  # noqa: E402
+from osimlite.mechanics.codegen.processor import processor_features  # noqa: E402
 
 PARTS = ("double", "dual")
 """The texts: kernels of floats, and kernels of floats that carry derivatives."""
 
-SOURCES = ("codegen/cplusplus", "codegen/reader.py", "forces", "kernels", "simulation/elements")
+SOURCES = (
+    "mechanics/codegen/cplusplus",
+    "mechanics/codegen/reader.py",
+    "mechanics/laws",
+    "mechanics/kernels",
+    "simulation/elements",
+)
 """Folders and files of the package that decide what the kernels are."""
 
 EXPORT = """#ifdef _WIN32
@@ -86,8 +92,8 @@ def write_text(folder: Path, part: str) -> None:
     for name in UNUSED:
         sys.modules.setdefault(name, StandIn(name))
     from osimlite import __version__
-    from osimlite.codegen.cplusplus import HEADER, header_text, write_library
-    from osimlite.codegen.sources import compute_digest
+    from osimlite.mechanics.codegen.cplusplus import HEADER, header_text, write_library
+    from osimlite.mechanics.codegen.sources import compute_digest
     from osimlite.simulation.elements.laws import DIRECTIONS, law_of, library_laws, symbol_of
 
     laws = library_laws(0 if part == PARTS[0] else DIRECTIONS)

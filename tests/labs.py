@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.io.tables.storage import StoTable, read_sto
 
 LABS = Path(__file__).parents[1] / "fixtures" / "labs"
 

@@ -36,7 +36,7 @@ QUICK_CASES: dict[str, tuple[str, ...]] = {
     "tests/oracle/test_lint_setups.py::test_opensim_computes_something_else": (
         "feet swapped", "forces of ground", "56",
     ),
-    "tests/sweep/test_run.py::test_a_command_that_is_ended_goes_on": ("2",),
+    "tests/studies/sweep/test_run.py::test_a_command_that_is_ended_goes_on": ("2",),
     "tests/optimal/check_faults.py::test_a_fault_is_told": ("placed",),
     "tests/oracle/test_random_faults.py::test_what_opensim_refuses_is_found": ("pendulum",),
     "tests/oracle/test_simulation.py::test_motion_forces_and_labels": (
@@ -49,9 +49,9 @@ QUICK_STRIDES: dict[str, int] = {
     "tests/optimal/check_derivatives.py::test_schemes_and_dynamics": 3,
     "tests/oracle/test_moco.py::test_what_moco_takes_without_a_word": 3,
     "tests/simulation/engines/test_imports.py::test_neither_numba_nor_scipy_is_imported": 3,
-    "tests/sweep/test_optimize.py::test_an_interrupted_search_goes_on": 3,
+    "tests/studies/sweep/test_optimize.py::test_an_interrupted_search_goes_on": 3,
     "tests/cli/test_doctor.py::test_what_is_needed_is_enough_and_is_needed": 3,
-    "tests/document/test_imports.py::test_what_a_short_command_leaves_out": 3,
+    "tests/io/document/test_imports.py::test_what_a_short_command_leaves_out": 3,
     "tests/lint/test_adoption.py::test_the_action_checks_every_path": 3,
     "tests/lint/test_damage.py::test_a_damaged_file_has_findings_in_places_that_exist": 2,
     "tests/lint/test_fixes.py::test_no_mend_makes_a_model_worse": 3,

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from tests import separate
 from tests.quick_cases import QUICK_CASES, QUICK_STRIDES
 
 HOW = "`pytest --full` runs them"
@@ -39,7 +40,9 @@ class Suite:
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
         """Deselect the tests of the full suite."""
-        _mark_cases(config, items)
+        if not separate.is_server(config):
+            # The process that asks for tests of `check_*.py` has chosen them.
+            _mark_cases(config, items)
         if is_full():
             return
         slow = [item for item in items if item.get_closest_marker("full")]

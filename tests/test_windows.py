@@ -16,18 +16,18 @@ import numpy as np
 import pytest
 
 from osimlite import validate
+from osimlite.base.files import from_folder, write_atomically
+from osimlite.base.pools import LocalPool
 from osimlite.cli import main
 from osimlite.cli._console import wants_colour
 from osimlite.cli.simulate import write_files
 from osimlite.errors import OsimliteError
-from osimlite.files import from_folder, write_atomically
 from osimlite.lint.baseline import write_baseline
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Finding, Report, Severity
 from osimlite.lint.many import check_files
 from osimlite.lint.reporters import render
 from osimlite.simulation import Trajectory
-from osimlite.sweep.pools import LocalPool
 
 
 class Results:

@@ -92,8 +92,8 @@ def _suggest_built_in(error: OsimliteError, command: str) -> str:
 
     if not isinstance(error, MissingFileError) or error.file is None or os.path.exists(error.file):
         return ""
+    from osimlite.base.text import nearest
     from osimlite.models import BUILT_IN
-    from osimlite.text import nearest
 
     name = error.file.removesuffix(".osim")
     if name in BUILT_IN:
@@ -114,7 +114,7 @@ def main(arguments: list[str] | None = None) -> None:
 
     Exits with 0 (done), 1 (the answer is no), 2 (could not be carried out) or 130 (interrupted).
     """
-    from osimlite._require import protect_processes
+    from osimlite.base.require import protect_processes
     from osimlite.cli._console import guarded_output
 
     protect_processes()

@@ -10,12 +10,12 @@ from hashlib import blake2b
 from zlib import crc32
 
 from osimlite import __version__
+from osimlite.base.files import read_file
+from osimlite.base.pruning import mark_used
+from osimlite.base.writing import user_cache_folder, write_cached
 from osimlite.errors import OsimliteError
-from osimlite.files import read_file
 from osimlite.lint.cache import key_of
 from osimlite.lint.config import Config
-from osimlite.pruning import mark_used
-from osimlite.writing import user_cache_folder, write_cached
 
 
 def answered(question: str, file: str, data: bytes, find: Callable[[], tuple[str, bool]]) -> str:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from osimlite.base.text import listed
 from osimlite.cli._console import add_row, plain_console, plain_table, say
-from osimlite.text import listed
 
 
 def check(file: Path, mjcf: Path, output: Path | None) -> None:
     """Print how far a file of MuJoCo's is from a model, muscle by muscle, and write it down if there is a folder."""
-    from osimlite.document.reader import read
-    from osimlite.files import make_folder, write_atomically
+    from osimlite.base.files import make_folder, write_atomically
+    from osimlite.io.document.reader import read
     from osimlite.translate.mjcf.check import check_mjcf
 
     result = check_mjcf(read(file), mjcf)

@@ -14,7 +14,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, NamedTuple, get_args, get_origin
 
 if TYPE_CHECKING:
-    from osimlite.choices import Choice
+    from osimlite.base.choices import Choice
 
 _NUMBERS = {int: re.compile(r"[0-9]+", re.ASCII), float: re.compile(r"[0-9]*\.?[0-9]+(e[-+]?[0-9]+)?", re.ASCII)}
 """Texts of numbers that mean the same to everybody."""

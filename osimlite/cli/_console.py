@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from osimlite.text import harmless, visible
+from osimlite.base.text import harmless, visible
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -61,7 +61,7 @@ def complain(text: object, cure: str = "") -> None:
 
 
 def show(lines: str, *, err: bool = False) -> None:
-    """Print lines whose names have gone through :func:`osimlite.text.visible`."""
+    """Print lines whose names have gone through :func:`osimlite.base.text.visible`."""
     (sys.stderr if err else sys.stdout).write(lines)
 
 

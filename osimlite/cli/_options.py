@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 from osimlite.cli._command import Argument, Option
 
 if TYPE_CHECKING:
-    from osimlite.choices import Choice
-    from osimlite.document.printer import Numbers as NumberStyle
-    from osimlite.multibody.mechanism import Mechanism
-    from osimlite.reflexes.feedback import Feedback
+    from osimlite.base.choices import Choice
+    from osimlite.io.document.printer import Numbers as NumberStyle
+    from osimlite.mechanics.multibody.mechanism import Mechanism
     from osimlite.schema.model import Model
+    from osimlite.studies.reflexes.feedback import Feedback
 
 File = Annotated[Path, Argument(help="A model file.", show_default=False)]
 Source = Annotated[
@@ -148,7 +148,7 @@ def simulating(*names: str) -> Callable[[], Iterator[Choice]]:
     """The options of a simulation, or those of these names, for :func:`osimlite.cli._command.command_with`."""
 
     def chosen() -> Iterator[Choice]:
-        from osimlite.choices import choices
+        from osimlite.base.choices import choices
         from osimlite.simulation.options import Options
 
         return (each for each in choices(Options) if not names or each.name in names)
@@ -168,14 +168,14 @@ def feedback(controller: Path | None, par: Path | None) -> Feedback | None:
         if par is not None:
             raise SettingError("--par has values for a controller; give that by --controller")
         return None
-    from osimlite.reflexes.feedback import Feedback
+    from osimlite.studies.reflexes.feedback import Feedback
 
     return Feedback(controller, {} if par is None else par)
 
 
 def results_folder(file: Path, output: Path | None) -> Path:
     """The folder that is asked for, else one in the current folder, named after the model's file."""
-    from osimlite.writing import expect_folder_inside
+    from osimlite.base.writing import expect_folder_inside
 
     if output is not None:
         return output
@@ -241,9 +241,9 @@ def quantities(
         OsimliteError: a word is not of that form, there is no such coordinate, the unit does not fit it, or a value
             of ``--set`` without a unit can hardly be meant in rad.
     """
+    from osimlite.base.text import did_you_mean
     from osimlite.errors import ModelError, OsimliteError, SettingError
     from osimlite.simulation.start import in_units_of, suspect_value
-    from osimlite.text import did_you_mean
 
     result = {}
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
@@ -271,8 +271,8 @@ def read_source(source: str, parameter: Iterable[str] | None) -> tuple[Model, Pa
     Raises:
         OsimliteError: there is none, or it does not take the parameters of ``-p``.
     """
-    from osimlite.document.reader import read
     from osimlite.errors import SettingError
+    from osimlite.io.document.reader import read
     from osimlite.models.source import make_model
 
     if Path(source).suffix.lower() != ".osim":

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
+from osimlite.base.text import visible
 from osimlite.cli._console import complain, plain_console, unguarded
-from osimlite.text import visible
 
 if TYPE_CHECKING:
     from rich.progress import Progress

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from osimlite.base.files import make_folder
+from osimlite.base.text import listed
 from osimlite.cli._console import say
-from osimlite.files import make_folder
-from osimlite.simulation.files.recorded import RecordedMotion
-from osimlite.simulation.files.storage import StoTable, write_sto
-from osimlite.text import listed
+from osimlite.io.tables.storage import StoTable, write_sto
+from osimlite.simulation.recorded_motion import RecordedMotion
 
 
 def written(recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Path, *, trc: bool = False) -> None:
@@ -21,7 +21,7 @@ def written(recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Pa
         )
     names = list(tables)
     if trc:
-        from osimlite.simulation.files.trc import write_trc
+        from osimlite.io.tables.trc import write_trc
 
         markers = tables["markers.sto"]
         labels = [label.removesuffix("_X") for label in markers.columns[::3]]

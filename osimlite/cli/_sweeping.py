@@ -10,7 +10,7 @@ from osimlite.cli._command import Option
 from osimlite.cli._options import named_words, read_source
 
 if TYPE_CHECKING:
-    from osimlite.sweep.plan import Plan
+    from osimlite.studies.sweep.plan import Plan
 
 Vary = Annotated[
     list[str] | None,
@@ -83,7 +83,7 @@ def make_plan(
 
     from osimlite.errors import SettingError, UnitWarning
     from osimlite.simulation.given_controls import words_to_controls
-    from osimlite.sweep.variables import parse
+    from osimlite.studies.sweep.variables import parse
 
     ranges = parse(vary or [])
     if not ranges and choices.get("controller") is None:
@@ -103,7 +103,7 @@ def _plan(source: str, ranges: Mapping[str, Any], parameter: Sequence[str] | Non
 
     from osimlite.errors import SettingError
     from osimlite.models.source import parameters_of
-    from osimlite.sweep.plan import plan
+    from osimlite.studies.sweep.plan import plan
 
     if Path(source).suffix.lower() == ".osim":
         model, folder = read_source(source, parameter)
@@ -129,8 +129,8 @@ def _make(source: str, given: Mapping[str, str], parameters: Mapping[str, float]
 
 
 def _levels(words: Sequence[str] | None, option: str) -> dict[str, str]:
+    from osimlite.base.quantity import quantity
     from osimlite.errors import SettingError
-    from osimlite.quantity import quantity
 
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
     result = named_words(words, option, form)

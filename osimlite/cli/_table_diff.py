@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from osimlite._require import require
+from osimlite.base.require import require
 
 if TYPE_CHECKING:
-    from osimlite.simulation.files.storage import StoTable
+    from osimlite.io.tables.storage import StoTable
 
 
 def table_differences(old: Path, new: Path) -> list[str]:
@@ -23,8 +23,8 @@ def table_differences(old: Path, new: Path) -> list[str]:
     require("numpy", extra="sim", purpose="comparing tables")
     import numpy as np
 
-    from osimlite.document.lexical import shortest
-    from osimlite.simulation.files.storage import StoTable, read_sto
+    from osimlite.io.document.lexical import shortest
+    from osimlite.io.tables.storage import StoTable, read_sto
 
     before, after = (
         StoTable("", np.zeros(0), (), np.zeros((0, 0))) if str(file) == "/dev/null" else read_sto(file)

@@ -7,22 +7,22 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from osimlite.base.files import read_standard_input, unsaved
+from osimlite.base.text import counted, listed
 from osimlite.cli._console import complain, hand_over, print_diff, say, show, wants_colour
 from osimlite.cli._options import named_folders
 from osimlite.cli._progress import progress_bar
 from osimlite.errors import MissingFileError, OsimliteError
-from osimlite.files import read_standard_input, unsaved
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Report, Severity
 from osimlite.lint.many import check_files, settings_of
 from osimlite.lint.reporters import FOR_PEOPLE, FORMATS, render
 from osimlite.lint.suffixes import project_files
-from osimlite.text import counted, listed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from osimlite.document.source import Source
+    from osimlite.io.document.source import Source
 
 
 def run(
@@ -108,7 +108,7 @@ def expect_known(format: str, fail_on: str | None) -> None:
 
 
 def _source(path: str) -> Source:
-    from osimlite.document.source import Source
+    from osimlite.io.document.source import Source
 
     if path == "-":
         return Source(read_standard_input(), "<stdin>")
@@ -171,7 +171,7 @@ def _mend_all(files: list[str], given: Config, unsafe: bool) -> tuple[int, int, 
 
 def _mend(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
     """Mend a file; how many mends that took, and how many guesses are left."""
-    from osimlite.files import written_atomically
+    from osimlite.base.files import written_atomically
 
     def put(pieces: list[bytes | memoryview]) -> Source:
         with written_atomically(path) as stream:
@@ -193,7 +193,7 @@ def _more(left: int) -> str:
 
 def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int, bool]:
     """Print what mending would change; how many mends that are, how many guesses are left, and if it cannot be read."""
-    from osimlite.document.source import Source
+    from osimlite.io.document.source import Source
 
     source = _source(path)
     after, count, left = _mended(source, given, unsafe, lambda pieces: Source(b"".join(pieces), source.file))

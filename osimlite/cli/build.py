@@ -40,12 +40,12 @@ def build(
 
     Example: osimlite build dynamic-walker -p thigh_length=0.42 -o walker.osim
     """
+    from osimlite.base.text import counted
     from osimlite.cli._console import complain, hand_over, say, show
-    from osimlite.document.printer import to_text, write
     from osimlite.errors import OsimliteError
+    from osimlite.io.document.printer import to_text, write
     from osimlite.lint import validate
     from osimlite.models.source import make_model, write_beside
-    from osimlite.text import counted
 
     if list_models:
         _list_models()

@@ -40,19 +40,19 @@ def check_trial(
 
     Example: osimlite check-trial subject01
     """
+    from osimlite.base.records import replace
     from osimlite.cli._console import hand_over, show, wants_colour
     from osimlite.cli._progress import progress_bar
     from osimlite.cli._validating import expect_known, terminal_width
     from osimlite.lint.diagnostic import Severity
     from osimlite.lint.reporters import FOR_PEOPLE, render
-    from osimlite.records import replace
     from osimlite.tools.trials.check import check_trial as check
 
     expect_known(format, fail_on)
     with progress_bar("checking", None) as progress:
         report = check(*paths, select=select, ignore=ignore, progress=lambda done, of: progress(done, of))
     if format == "json":
-        from osimlite.text import json_lines
+        from osimlite.base.text import json_lines
 
         hand_over(json_lines(report.as_dict()))
     elif format not in FOR_PEOPLE:

@@ -11,16 +11,16 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
+from osimlite.base.records import dataclass, replace
+from osimlite.base.text import listed
 from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command
 from osimlite.cli._console import say, show
 from osimlite.cli._progress import motion_bar
-from osimlite.records import dataclass, replace
-from osimlite.text import listed
 
 if TYPE_CHECKING:
-    from osimlite.reflexes.scenario import Scenario
     from osimlite.simulation.trajectory import Trajectory
+    from osimlite.studies.reflexes.scenario import Scenario
 
 ACCURACY = 1e-5
 """Accuracy of the integrator in all motions of the tour."""
@@ -58,7 +58,7 @@ def demo(
 
     Example: osimlite demo -o tour --no-browser
     """
-    from osimlite._require import require
+    from osimlite.base.require import require
     from osimlite.simulation.engines import engine_factory
 
     engine_factory("compiled")
@@ -104,8 +104,8 @@ class _Tour:
 
 def _check(tour: _Tour) -> None:
     """Build the walker of the exercise, validate it, and translate it."""
-    from osimlite.document.printer import write
-    from osimlite.files import make_folder, write_atomically
+    from osimlite.base.files import make_folder, write_atomically
+    from osimlite.io.document.printer import write
     from osimlite.lint import validate
     from osimlite.lint.reporters import render
     from osimlite.models.dynamic_walker import dynamic_walker
@@ -138,7 +138,7 @@ def _check(tour: _Tour) -> None:
 
 def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
     """Simulate the three models, and write what there is to look at; the pages of that."""
-    from osimlite.document.printer import write
+    from osimlite.io.document.printer import write
     from osimlite.models.source import make_model
     from osimlite.simulation.run import Simulation
 
@@ -161,7 +161,7 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
     human, states, said = _walk(tour)
     if not pictures:
         return []
-    from osimlite.multibody import build_mechanism
+    from osimlite.mechanics.multibody import build_mechanism
     from osimlite.view import Shown, Story, plot_simulation
 
     human_title, human_page = "It walks by reflexes", "human-walks.html"
@@ -227,9 +227,9 @@ def _count_steps(motion: Trajectory) -> int:
 
 def _walk(tour: _Tour) -> tuple[Scenario, Path, str]:
     """Have the human walk by reflexes; the scenario, the file of the states, and what came out."""
+    from osimlite.io.tables.storage import write_sto
     from osimlite.models.walking import write_scenario
-    from osimlite.reflexes.scenario import Scenario
-    from osimlite.simulation.files.storage import write_sto
+    from osimlite.studies.reflexes.scenario import Scenario
 
     with tour.step("Have a human walk for ten seconds, by reflexes of 16 muscles") as tell:
         scenario = Scenario(write_scenario(tour.folder / "human-walks"))

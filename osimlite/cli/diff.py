@@ -29,8 +29,8 @@ def diff(
     Example: osimlite diff gait2392.osim gait2392_scaled.osim
     """
     from osimlite.cli._console import say
-    from osimlite.document.reader import read_any
     from osimlite.errors import OsimliteError
+    from osimlite.io.document.reader import read_any
     from osimlite.lint.suffixes import is_table
     from osimlite.schema.difference import differences
     from osimlite.schema.model import Model
@@ -82,7 +82,7 @@ def described(found: list[Difference]) -> list[str]:
 
 def _words(value: Any) -> str:
     if isinstance(value, float):
-        from osimlite.document.lexical import shortest
+        from osimlite.io.document.lexical import shortest
 
         return shortest(value)
     if isinstance(value, bool):

@@ -12,8 +12,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-from osimlite._cores import cores
-from osimlite._require import SAFE_PATH
+from osimlite.base.cores import cores
+from osimlite.base.require import SAFE_PATH
 from osimlite.cli._command import Argument, command
 from osimlite.cli._console import add_row, plain_console, plain_table, say
 from osimlite.cli._kernels import explain_kernels
@@ -51,9 +51,9 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "view --screenshot": ("numpy", "pillow"),
     "view --rerun": ("numpy", "rerun-sdk"),
     "simulate --animate": ("numpy", "pillow"),
-    "osimlite.gym": ("gymnasium", "numpy"),
+    "osimlite.studies.gym": ("gymnasium", "numpy"),
     "markers and forces of .c3d files": ("numpy", "ezc3d"),
-    "osimlite.mjcf, translate --check": ("mujoco", "numpy"),
+    "osimlite.translate.mjcf.driver, translate --check": ("mujoco", "numpy"),
     "osimlite.casadi": ("casadi", "numpy"),
     "models as YAML": ("pyyaml",),
     "trajectory.to_frame()": ("pandas",),
@@ -224,9 +224,9 @@ def _modules(path: tuple[str, ...]) -> dict[str, list[str]]:
 
 def _show_places(model: Path | None) -> None:
     """Settings and mesh folders, as `validate` and `translate` find them for this model, or in this folder."""
-    from osimlite.files import GEOMETRY_VARIABLE
+    from osimlite.base.files import GEOMETRY_VARIABLE
+    from osimlite.io.meshes.folders import MeshFolders
     from osimlite.lint.settings import settings_for
-    from osimlite.meshes.folders import MeshFolders
 
     folder = Path.cwd() if model is None else model.resolve() if model.is_dir() else model.resolve().parent
     settings = settings_for(folder)

@@ -11,7 +11,7 @@ from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import Facts
 
 if TYPE_CHECKING:
-    from osimlite.gait.gaits import Gait
+    from osimlite.studies.gait.gaits import Gait
 
 
 @command_with(options.simulating("skip_unsupported"))
@@ -56,7 +56,7 @@ def find_gait(
     --vary LHip_rz=-30deg:60deg --vary RHip_rz/speed=-4:4 --vary LHip_rz/speed=-4:4
     """
     from osimlite.cli._progress import progress_bars
-    from osimlite.gait.gaits import find_gait as search
+    from osimlite.studies.gait.gaits import find_gait as search
 
     plan = sweeping.make_plan(source, vary, parameter, None, None, skip_unsupported=skip_unsupported)
     with progress_bars() as stage:
@@ -70,8 +70,8 @@ def find_gait(
 
 
 def _told(gait: Gait) -> Facts:
-    from osimlite.gait.cycle_search import STARTS, STEPS
-    from osimlite.text import counted, listed
+    from osimlite.base.text import counted, listed
+    from osimlite.studies.gait.cycle_search import STARTS, STEPS
 
     cycle, walk = gait.found.cycle, gait.walk
     stable = "stable" if cycle.largest < 1.0 else "not stable"

@@ -36,11 +36,11 @@ def fit(
 
     Example: osimlite fit gait2392.osim walk*.trc --static static.trc --hold RASI --hold LASI --mass 72 -o subject
     """
+    from osimlite.base.files import make_folder, write_atomically
     from osimlite.cli._console import say
-    from osimlite.document.reader import read
-    from osimlite.files import make_folder, write_atomically
     from osimlite.fitting.person import fit as fitted
     from osimlite.fitting.person_files import person_texts
+    from osimlite.io.document.reader import read
 
     person = fitted(
         read(file),

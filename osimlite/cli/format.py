@@ -24,11 +24,11 @@ def format(
 
     Example: osimlite format models --check
     """
+    from osimlite.base.files import write_atomically
     from osimlite.cli._console import complain, print_diff, say
-    from osimlite.document.formatting import formatted
-    from osimlite.document.source import Source
     from osimlite.errors import OsimliteError
-    from osimlite.files import write_atomically
+    from osimlite.io.document.formatting import formatted
+    from osimlite.io.document.source import Source
     from osimlite.lint.suffixes import DOCUMENTS, project_files
 
     changed, same, worst = 0, 0, 0

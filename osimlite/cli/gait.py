@@ -6,20 +6,20 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from osimlite.base.records import dataclass, field
 from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import Facts
 from osimlite.cli._progress import progress_bar
-from osimlite.records import dataclass, field
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from osimlite.gait.basin import Basin
-    from osimlite.gait.cycle import Cycle
-    from osimlite.gait.stepmap import StepMap
-    from osimlite.gait.steps import Scuff, Step, Walk
     from osimlite.simulation.many import BatchEngine
+    from osimlite.studies.gait.basin import Basin
+    from osimlite.studies.gait.cycle import Cycle
+    from osimlite.studies.gait.stepmap import StepMap
+    from osimlite.studies.gait.steps import Scuff, Step, Walk
 
 
 WALK_ACCURACY = 1e-6
@@ -70,11 +70,11 @@ def gait(
 
     Example: osimlite gait steady-walker --perturb 0.05 --basin -o gait
     """
-    from osimlite._require import require
-    from osimlite.files import folder_to_fill
-    from osimlite.gait.basin import basin_places, find_basin, perturbed, walks_from
-    from osimlite.gait.stepmap import refuse_constraints
+    from osimlite.base.files import folder_to_fill
+    from osimlite.base.require import require
     from osimlite.simulation.run import Simulation
+    from osimlite.studies.gait.basin import basin_places, find_basin, perturbed, walks_from
+    from osimlite.studies.gait.stepmap import refuse_constraints
 
     if basin and pictures and output:
         require("matplotlib", extra="plot", purpose="a picture of a basin")
@@ -153,10 +153,10 @@ def simulate_walk(
 ) -> tuple[GaitReport, StepMap | None]:
     """The walk from a state and the cycle near it, with the step map that has it as a fixed point."""
     from osimlite.errors import OsimliteError
-    from osimlite.gait.cycle import find_cycle
-    from osimlite.gait.foot_contacts import find_footing
-    from osimlite.gait.stepmap import StepMap
-    from osimlite.gait.steps import walk_many
+    from osimlite.studies.gait.cycle import find_cycle
+    from osimlite.studies.gait.foot_contacts import find_footing
+    from osimlite.studies.gait.stepmap import StepMap
+    from osimlite.studies.gait.steps import walk_many
 
     footing = find_footing(engine, feet)
     (walk,) = walk_many(engine, [state], to, footing=footing, accuracy=WALK_ACCURACY)
@@ -172,8 +172,8 @@ def simulate_walk(
 
 
 def _told(found: GaitReport, files: Sequence[Path]) -> Facts:
+    from osimlite.base.text import counted
     from osimlite.simulation.elements import by_class
-    from osimlite.text import counted
 
     walk, cycle = found.walk, found.cycle
     facts = Facts(found.model)
@@ -210,7 +210,7 @@ def _told(found: GaitReport, files: Sequence[Path]) -> Facts:
 def _write(folder: Path, found: GaitReport, pictures: bool) -> list[Path]:
     import json
 
-    from osimlite.files import write_atomically
+    from osimlite.base.files import write_atomically
 
     written = [folder / "gait.json"]
     write_atomically(written[0], (json.dumps(_facts(found), indent=1) + "\n").encode())
@@ -225,7 +225,7 @@ def _write(folder: Path, found: GaitReport, pictures: bool) -> list[Path]:
         written.append(folder / "basin.csv")
         write_atomically(written[-1], ("\n".join(rows) + "\n").encode())
         if pictures:
-            from osimlite.view.basin import draw_basin
+            from osimlite.studies.gait.basin_plot import draw_basin
 
             written.append(draw_basin(basin, folder / "basin.png", title=found.model))
     return written

@@ -38,18 +38,18 @@ def ik(
 
     Example: osimlite ik gait2392.osim walk.trc --weight RASI=10 -o results
     """
+    from osimlite.base.files import make_folder, write_atomically
+    from osimlite.base.text import listed
     from osimlite.cli._console import say
-    from osimlite.document.reader import read
-    from osimlite.files import make_folder, write_atomically
     from osimlite.fitting.ik_tool import motion_table, told
     from osimlite.fitting.inverse_kinematics import inverse_kinematics
     from osimlite.fitting.marker_data import MarkerData
     from osimlite.fitting.orientation_data import holds_orientations
     from osimlite.fitting.unknown_classes import IGNORED, describe_unknown
+    from osimlite.io.document.reader import read
+    from osimlite.io.tables.old_storage import UNITS, printed
+    from osimlite.io.tables.storage import write_sto
     from osimlite.schema.markers import Marker
-    from osimlite.simulation.files.old_storage import UNITS, printed
-    from osimlite.simulation.files.storage import write_sto
-    from osimlite.text import listed
 
     weights, kept = options.named_numbers(weight, "--weight"), options.named_numbers(keep, "--keep")
     of_sensors = holds_orientations(trial)

@@ -10,8 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from osimlite.base.text import counted
 from osimlite.cli._command import Argument, Option, command
-from osimlite.text import counted
 
 if TYPE_CHECKING:
     from osimlite.schema.base import Object
@@ -32,8 +32,8 @@ def info(
     """
     from osimlite.cli._answers import answered
     from osimlite.cli._console import Facts, say
-    from osimlite.document.reader import read_document
-    from osimlite.document.source import Source
+    from osimlite.io.document.reader import read_document
+    from osimlite.io.document.source import Source
     from osimlite.lint.suffixes import is_table
     from osimlite.schema.base import Object
     from osimlite.schema.coordinates import Coordinate
@@ -101,10 +101,10 @@ def info(
 
 
 def _table(file: Path, everything: bool) -> None:
+    from osimlite.base.files import read_file
     from osimlite.cli._console import Facts
-    from osimlite.files import read_file
+    from osimlite.io.tables.headers import StorageHeader
     from osimlite.lint.table import Table
-    from osimlite.tables import StorageHeader
 
     table = Table(read_file(file), str(file))
     said = {key: entry.value.text for key, entry in table.entries.items()}
@@ -155,8 +155,8 @@ def _classes(objects: Sequence[Object], everything: bool) -> None:
 
 def _listed(title: str, items: Sequence[str], everything: bool) -> None:
     """Print some items, or the first of them."""
+    from osimlite.base.text import visible
     from osimlite.cli._console import columns, say, show
-    from osimlite.text import visible
 
     shown = items if everything else items[:15]
     # The words of an item stay together.
@@ -207,13 +207,13 @@ def _muscles(muscles: Sequence[Any]) -> Iterator[str]:
 
 def _simulation(model: Model, folder: Path, text: str) -> tuple[str, bool]:
     """What of a model cannot be simulated, and whether that follows from its file alone."""
-    from osimlite._require import require
+    from osimlite.base.require import require
+    from osimlite.base.text import listed
     from osimlite.errors import OsimliteError
-    from osimlite.text import listed
 
     try:
         require("numpy", extra="sim", purpose="simulations")
-        from osimlite.multibody import build_mechanism
+        from osimlite.mechanics.multibody import build_mechanism
         from osimlite.simulation.elements import by_class, force_elements
 
         mechanism = build_mechanism(model)

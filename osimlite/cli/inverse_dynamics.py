@@ -36,7 +36,7 @@ def inverse_dynamics(
     Example: osimlite inverse-dynamics gait2392.osim walk.mot --lowpass 6 --external-loads grf.xml -o results
     """
     from osimlite.cli._recorded import written
-    from osimlite.document.reader import read
+    from osimlite.io.document.reader import read
     from osimlite.simulation.recorded import inverse_dynamics as forces_of
 
     table = forces_of(

@@ -29,7 +29,7 @@ def kinematics(
     Example: osimlite kinematics gait2392.osim walk.mot -o results
     """
     from osimlite.cli._recorded import written
-    from osimlite.document.reader import read
+    from osimlite.io.document.reader import read
     from osimlite.simulation.recorded import kinematics as followed
 
     recorded = followed(read(file), motion, assemble=assemble, lowpass=lowpass, start=first, end=last)

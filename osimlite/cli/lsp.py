@@ -18,9 +18,9 @@ def lsp(
     An editor starts it and speaks the Language Server Protocol over its standard input and output. How to set up
     VS Code, Neovim, Helix and Emacs is said in docs/editors.md.
     """
-    from osimlite._require import require
+    from osimlite.base.require import require
 
     require("pygls", extra="lsp", purpose="the language server")
-    from osimlite.lsp.server import make_server
+    from osimlite.cli.language_server.server import make_server
 
     make_server().start_io()

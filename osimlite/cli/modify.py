@@ -35,15 +35,15 @@ def modify(
 
     Example: osimlite modify gait.osim --replace muscles=degroote --replace tendon=rigid --replace paths=polynomial
     """
+    from osimlite.base.text import counted
     from osimlite.cli._console import add_row, plain_console, plain_table, say
-    from osimlite.document.printer import write
-    from osimlite.document.reader import read, read_any
     from osimlite.errors import DocumentError, SettingError
-    from osimlite.modifying.processing import processed
-    from osimlite.modifying.words import change_of
+    from osimlite.fitting.modifying.processing import processed
+    from osimlite.fitting.modifying.words import change_of
+    from osimlite.io.document.printer import write
+    from osimlite.io.document.reader import read, read_any
     from osimlite.schema.model import Model
     from osimlite.schema.tools.processors import ModelProcessor
-    from osimlite.text import counted
 
     changes = []
     for word in replace or ():

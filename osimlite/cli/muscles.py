@@ -10,7 +10,7 @@ from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
 
 if TYPE_CHECKING:
-    from osimlite.multibody.mechanism import Mechanism
+    from osimlite.mechanics.multibody.mechanism import Mechanism
     from osimlite.simulation.muscle_curves import MuscleCurves
 
 
@@ -58,14 +58,14 @@ def muscles(
 
     Example: osimlite muscles gait2392.osim --coordinate knee_angle_r=-120deg:0 --plot
     """
+    from osimlite.base.files import expect_folder_of
+    from osimlite.base.text import listed
     from osimlite.cli._console import say
     from osimlite.cli._progress import progress_bar
-    from osimlite.document.reader import read
     from osimlite.errors import ModelError, SettingError
-    from osimlite.files import expect_folder_of
-    from osimlite.multibody import build_mechanism
+    from osimlite.io.document.reader import read
+    from osimlite.mechanics.multibody import build_mechanism
     from osimlite.simulation.muscle_curves import muscle_curves
-    from osimlite.text import listed
 
     if output is not None and output.suffix not in (".csv", ".parquet"):
         raise SettingError(f"a table of muscles is written as .csv or .parquet, not '{output.name}'")
@@ -146,9 +146,9 @@ def _swept(mechanism: Mechanism, words: Sequence[str], points: int) -> dict[str,
 
 def _common(first: MuscleCurves, second: MuscleCurves) -> tuple[MuscleCurves, MuscleCurves]:
     """Both with the muscles whose names both have."""
+    from osimlite.base.text import listed
     from osimlite.cli._console import say
     from osimlite.errors import ModelError
-    from osimlite.text import listed
 
     names = [[path.rpartition("/")[2] for path in curves.muscles] for curves in (first, second)]
     both = [name for name in names[0] if name in names[1]]
@@ -167,8 +167,8 @@ def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> 
     """A table that fits a terminal: what is least and greatest, or the largest differences."""
     import numpy as np
 
+    from osimlite.base.text import span
     from osimlite.cli._console import add_row, plain_console, plain_table, say
-    from osimlite.text import span
 
     first, *others = curves
     arms = {f"moment_arm_{name}": f"arm {name} (mm)" for name in first.coordinates}
@@ -198,7 +198,7 @@ def _write(found: Mapping[str, MuscleCurves], output: Path) -> None:
 
     import numpy as np
 
-    from osimlite.files import write_atomically
+    from osimlite.base.files import write_atomically
 
     columns: dict[str, list[Any]] = {}
     for file, curves in found.items():
@@ -206,7 +206,7 @@ def _write(found: Mapping[str, MuscleCurves], output: Path) -> None:
         for name, column in {"model": np.full(len(rows["muscle"]), file), **rows, **numbers}.items():
             columns.setdefault(name, []).extend(column.tolist())
     if output.suffix == ".parquet":
-        from osimlite._require import require
+        from osimlite.base.require import require
 
         arrow = require("pyarrow", extra="sweep", purpose="a .parquet table")
         parquet = require("pyarrow.parquet", extra="sweep", purpose="a .parquet table")

@@ -11,7 +11,7 @@ from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import Facts
 
 if TYPE_CHECKING:
-    from osimlite.sweep.optimize import Optimum
+    from osimlite.studies.sweep.optimize import Optimum
 
 
 @command_with(options.simulating(*sweeping.PASSED))
@@ -94,8 +94,8 @@ def optimize(
     Example: osimlite optimize walker.osim --objective distance --vary RHip_rz=0:60deg --vary Pelvis_tx/speed=0:2
     """
     from osimlite.cli._progress import progress_bar
-    from osimlite.sweep.optimize import Objective, found_by
-    from osimlite.sweep.optimize import optimize as search
+    from osimlite.studies.sweep.optimize import Objective, found_by
+    from osimlite.studies.sweep.optimize import optimize as search
 
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure or ()), to=to,
@@ -112,7 +112,7 @@ def optimize(
 
 
 def _told(objective: str, found: Optimum) -> Facts:
-    from osimlite.sweep.optimize import BEST, HISTORY, PAR, SUMMARY
+    from osimlite.studies.sweep.optimize import BEST, HISTORY, PAR, SUMMARY
 
     facts = Facts(f"{objective} {found.value:.6g}")
     for name, value in found.values.items():

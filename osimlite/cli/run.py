@@ -78,9 +78,9 @@ def run(
 
     Example: osimlite run scale.xml 'trials/*/ik.xml' 'trials/*/id.xml' --workers 4
     """
+    from osimlite.base.files import expect_folder_of
     from osimlite.cli._progress import progress_bar
     from osimlite.errors import SettingError
-    from osimlite.files import expect_folder_of
     from osimlite.tools.many import found, run_many
     from osimlite.tools.named_files import inputs_among
 
@@ -175,7 +175,7 @@ def _write_report(outcomes: Mapping[str | Path, Outcome], report: Path | None, *
     from osimlite.cli._console import say
 
     if report is not None:
-        from osimlite.view.report import report as write_report
+        from osimlite.tools.report import report as write_report
 
         say(f"wrote {write_report(outcomes, report)}", err=err)
 
@@ -188,8 +188,8 @@ def _show_findings(report: Report) -> None:
 
 
 def _show(setup: Path, outcome: Outcome) -> None:
+    from osimlite.base.text import counted
     from osimlite.cli._console import Facts
-    from osimlite.text import counted
 
     facts = Facts(str(setup), outcome.told)
     unsaid = [finding for finding in outcome.warnings if finding.suggestion is None]
@@ -205,8 +205,8 @@ def _show(setup: Path, outcome: Outcome) -> None:
 def _show_trials(trials: list[Trial]) -> None:
     from collections import Counter
 
+    from osimlite.base.text import counted
     from osimlite.cli._console import add_row, plain_console, plain_table, show
-    from osimlite.text import counted
     from osimlite.tools.many import STATUSES
 
     shown = trials

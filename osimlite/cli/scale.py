@@ -49,10 +49,10 @@ def scale(
     Example: osimlite scale gait2392.osim static.trc --distance femur_r=RASI:RKNE --mass 72 --place -o subject.osim
     """
     from osimlite.cli._console import say
-    from osimlite.document.printer import write
-    from osimlite.document.reader import read
     from osimlite.errors import SettingError
     from osimlite.fitting.scale_tool import scale as scaled
+    from osimlite.io.document.printer import write
+    from osimlite.io.document.reader import read
 
     measurements = {
         body: ([_pair(pair, body) for pair in pairs.split(",")], {body.partition(".")[0]: _axes(body)})

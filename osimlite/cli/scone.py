@@ -51,15 +51,15 @@ def scone(
 
     Example: osimlite scone human-walks -o walk
     """
+    from osimlite.base.files import make_folder
     from osimlite.cli._console import Facts, show
     from osimlite.errors import SettingError
-    from osimlite.files import make_folder
+    from osimlite.io.tables.storage import write_sto
     from osimlite.models.walking import SCENARIO, write_scenario
-    from osimlite.reflexes.gait import gait_of
-    from osimlite.reflexes.parameters import read_par
-    from osimlite.reflexes.scenario import Scenario
-    from osimlite.reflexes.search import BEST, search
-    from osimlite.simulation.files.storage import write_sto
+    from osimlite.studies.reflexes.gait import gait_of
+    from osimlite.studies.reflexes.parameters import read_par
+    from osimlite.studies.reflexes.scenario import Scenario
+    from osimlite.studies.reflexes.search import BEST, search
 
     if not optimize and (resume or any(given is not None for given in (generations, population, seed))):
         raise SettingError("--generations, --population, --seed and --resume say how to search; add --optimize")

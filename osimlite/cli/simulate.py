@@ -57,9 +57,9 @@ def simulate(
 
     Example: osimlite simulate walker.osim --to 2 --set RHip_rz=40deg -o results --plot
     """
-    from osimlite._require import require
-    from osimlite.document.reader import read
+    from osimlite.base.require import require
     from osimlite.errors import SettingError, SimulationError
+    from osimlite.io.document.reader import read
 
     if plot:
         require("matplotlib", extra="plot", purpose="drawing")
@@ -135,8 +135,8 @@ def write_files(
     import shutil
     import tempfile
 
+    from osimlite.base.files import make_folder, put_in_place
     from osimlite.errors import OsimliteError
-    from osimlite.files import make_folder, put_in_place
 
     is_new = not folder.exists()
     make_folder(folder)

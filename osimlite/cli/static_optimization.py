@@ -51,7 +51,7 @@ def static_optimization(
     """
     from osimlite.cli._console import complain
     from osimlite.cli._recorded import say_motion
-    from osimlite.document.reader import read
+    from osimlite.io.document.reader import read
     from osimlite.simulation.shared_forces import static_optimization as shared_forces
 
     found = shared_forces(

@@ -11,8 +11,8 @@ from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import Facts, complain
 
 if TYPE_CHECKING:
-    from osimlite.sweep.plan import Plan
-    from osimlite.sweep.run import Outcome
+    from osimlite.studies.sweep.plan import Plan
+    from osimlite.studies.sweep.run import Outcome
 
 
 @command_with(options.simulating(*sweeping.PASSED))
@@ -66,8 +66,8 @@ def sweep(
     Example: osimlite sweep walker.osim --vary RHip_rz=20deg:40deg --vary Pelvis_tx/speed=0:1 --samples 1000
     """
     from osimlite.cli._progress import progress_bar
-    from osimlite.sweep.run import sweep as run
-    from osimlite.sweep.sampling import samples as choose
+    from osimlite.studies.sweep.run import sweep as run
+    from osimlite.studies.sweep.sampling import samples as choose
 
     plan = sweeping.make_plan(
         source, vary, parameter, stop_below, stop_above, controls, measures=tuple(measure) if measure else None,
@@ -86,9 +86,9 @@ def sweep(
 
 
 def _told(plan: Plan, outcome: Outcome) -> Facts:
-    from osimlite.sweep.measures import measure_name
-    from osimlite.sweep.results import ranges
-    from osimlite.text import counted
+    from osimlite.base.text import counted
+    from osimlite.studies.sweep.measures import measure_name
+    from osimlite.studies.sweep.results import ranges
 
     facts = Facts(counted(outcome.count, "run"))
     new = sum(outcome.status.values())

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from osimlite.base.text import listed
 from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import add_row, plain_console, plain_table, say
-from osimlite.exporters import exporters
-from osimlite.text import listed
+from osimlite.translate.exporters import exporters
 
 if TYPE_CHECKING:
-    from osimlite.choices import Choice
+    from osimlite.base.choices import Choice
     from osimlite.translate.fidelity import Fidelity
 
 
@@ -57,8 +57,8 @@ def translate(
 
     Example: osimlite translate gait.osim --geometry ~/OpenSim/Geometry -o robot
     """
-    from osimlite.document.reader import read
     from osimlite.errors import OsimliteError, SettingError
+    from osimlite.io.document.reader import read
 
     if check is not None and str(check) != WRITTEN:
         from osimlite.cli._checking_mjcf import check as check_mjcf
@@ -66,7 +66,7 @@ def translate(
         check_mjcf(file, check, output)
         return
     if check is not None:
-        from osimlite._require import require
+        from osimlite.base.require import require
 
         require("mujoco", extra="mujoco", purpose="--check")
         to = "mjcf"

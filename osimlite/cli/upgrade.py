@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from osimlite.base.text import counted
 from osimlite.cli import _options as options
 from osimlite.cli._command import Argument, Option, command
 from osimlite.cli._console import add_row, plain_console, plain_table, say
-from osimlite.text import counted
 
 if TYPE_CHECKING:
-    from osimlite.document.reader import Document
-    from osimlite.document.upgrade import Change
+    from osimlite.io.document.reader import Document
+    from osimlite.io.document.upgrade import Change
 
 
 @command
@@ -37,10 +37,10 @@ def upgrade(
 
     Example: osimlite upgrade gait2354.osim -o gait2354_v4.osim
     """
-    from osimlite.document.printer import write
-    from osimlite.document.reader import read_document, require_stated_version
-    from osimlite.document.source import Source
     from osimlite.errors import OsimliteError
+    from osimlite.io.document.printer import write
+    from osimlite.io.document.reader import read_document, require_stated_version
+    from osimlite.io.document.source import Source
     from osimlite.schema.base import Object
     from osimlite.schema.model import CURRENT_VERSION
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from osimlite.choices import Choice
+from osimlite.base.choices import Choice
 from osimlite.cli import _options as options
 from osimlite.cli._command import Argument, Option, command_with
-from osimlite.exporters import exporters
+from osimlite.translate.exporters import exporters
 
 if TYPE_CHECKING:
     from osimlite.view.shown import Shown
@@ -57,7 +57,7 @@ def view(
     Example: osimlite view gait.osim walk.sto --geometry ~/OpenSim/Geometry --html walk.html
     """
     from osimlite.cli._console import say
-    from osimlite.document.reader import read
+    from osimlite.io.document.reader import read
     from osimlite.view.incomplete import build_showable, describe_errors
     from osimlite.view.shown import Shown
 

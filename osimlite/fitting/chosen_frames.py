@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from osimlite.base.text import counted, did_you_mean, listed
 from osimlite.errors import SettingError
 from osimlite.fitting.inverse_kinematics import check_weight
 from osimlite.fitting.marker_data import MarkerData
-from osimlite.multibody.spatial import Array
-from osimlite.text import counted, did_you_mean, listed
+from osimlite.mechanics.multibody.spatial import Array
 
 STATIC = "static"
 """What the trial is called in which the subject stands."""

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, field
+from osimlite.base.records import dataclass, field
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.movement import Movement
 

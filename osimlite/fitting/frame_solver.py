@@ -7,17 +7,17 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite.base.text import did_you_mean
 from osimlite.errors import SettingError
 from osimlite.fitting.inverse_kinematics import first_pose, marker_stations, without_slides
 from osimlite.fitting.orientation_data import rotations
 from osimlite.fitting.pose_fit import PoseFit
 from osimlite.fitting.pose_layout import Marker, Sensor
 from osimlite.fitting.sensors import sensor_frames
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.mechanism import Values
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import Values
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.text import did_you_mean
 
 
 class FrameSolver:

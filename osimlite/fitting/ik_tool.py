@@ -9,15 +9,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.text import counted, did_you_mean, listed
 from osimlite.errors import SettingError
 from osimlite.fitting.fitted_motion import ADVICE, FittedMotion
 from osimlite.fitting.inverse_kinematics import check_weight, fitted, marker_stations
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.pose_layout import Goal
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.smoothing_spline import smoothing_spline
-from osimlite.multibody.spatial import Array
+from osimlite.io.tables.storage import StoTable, read_sto
+from osimlite.io.tables.times import both_of
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.tools.inverse_kinematics import (
     IKCoordinateTask,
@@ -25,9 +28,6 @@ from osimlite.schema.tools.inverse_kinematics import (
     IKTask,
     InverseKinematicsTool,
 )
-from osimlite.simulation.files.storage import StoTable, read_sto
-from osimlite.simulation.files.times import both_of
-from osimlite.text import counted, did_you_mean, listed
 
 ABSURD = 1.0
 """A root mean square of the marker errors (m) that no pose of a person leaves."""

@@ -12,6 +12,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite.base.records import replace
+from osimlite.base.text import did_you_mean
 from osimlite.errors import SettingError
 from osimlite.fitting.fitted_motion import FittedMotion
 from osimlite.fitting.marker_data import MarkerData, Measured
@@ -20,14 +22,12 @@ from osimlite.fitting.pose_fit import PoseFit, Poses
 from osimlite.fitting.pose_layout import Goal, Marker, Sensor
 from osimlite.fitting.sensors import sensor_frames
 from osimlite.fitting.undetermined import find_undetermined
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.constraints import Lock, Prescribed
-from osimlite.multibody.mechanism import Mechanism, StationPlacement
-from osimlite.multibody.spatial import Array
-from osimlite.records import replace
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.constraints import Lock, Prescribed
+from osimlite.mechanics.multibody.mechanism import Mechanism, StationPlacement
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.markers import Marker as ModelMarker
 from osimlite.schema.model import Model
-from osimlite.text import did_you_mean
 
 SAME_TIMES = 1e-9
 """What the times of markers and orientations may be apart (s)."""

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite.base.files import read_file
+from osimlite.base.records import dataclass
 from osimlite.errors import DocumentError
-from osimlite.files import read_file
 from osimlite.fitting.recorded import Recording
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
-from osimlite.simulation.files.c3d import ENDING, read_c3d_markers
-from osimlite.simulation.files.storage import read_sto
-from osimlite.tables import METRES, MarkerHeader
+from osimlite.io.tables.c3d import ENDING, read_c3d_markers
+from osimlite.io.tables.headers import METRES, MarkerHeader
+from osimlite.io.tables.storage import read_sto
+from osimlite.mechanics.multibody.spatial import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,16 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.text import did_you_mean, listed
 from osimlite.errors import SettingError
 from osimlite.fitting.inverse_kinematics import marker_stations
 from osimlite.fitting.marker_data import MarkerData
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.model import Model
 from osimlite.schema.tools.scale import Measurement, Scale, ScaleSet
-from osimlite.text import did_you_mean, listed
 
 NEARLY = 1e-16
 """By how much (s) a time may fall short of the end of a range and be taken for it, as in OpenSim."""

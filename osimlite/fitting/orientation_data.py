@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite.base.records import dataclass, replace
 from osimlite.errors import DocumentError, SettingError
 from osimlite.fitting.recorded import Recording
-from osimlite.multibody.spatial import Array, rotation_about_space, rotation_of
-from osimlite.records import dataclass, replace
-from osimlite.simulation.files.storage import read_sto
-from osimlite.simulation.files.table_stream import TableStream
+from osimlite.io.tables.storage import read_sto
+from osimlite.io.tables.table_stream import TableStream
+from osimlite.mechanics.multibody.spatial import Array, rotation_about_space, rotation_of
 
 KIND = "Quaternion"
 """What a table of orientations holds."""

@@ -13,6 +13,8 @@ from math import sqrt
 
 import numpy as np
 
+from osimlite.base.records import dataclass
+from osimlite.base.text import did_you_mean, listed
 from osimlite.errors import SettingError
 from osimlite.fitting.chosen_frames import STATIC, ChosenFrames
 from osimlite.fitting.inverse_kinematics import first_pose, marker_stations
@@ -21,14 +23,12 @@ from osimlite.fitting.marker_data import Measured as Markers
 from osimlite.fitting.scaling import scale_model
 from osimlite.fitting.segments import Segments
 from osimlite.fitting.shape import Posed, Shape
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.mechanism import GROUND, Mechanism
-from osimlite.multibody.schema_frames import Placements
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
+from osimlite.mechanics.multibody.schema_frames import Placements
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.markers import Marker as ModelMarker
 from osimlite.schema.model import Model
-from osimlite.text import did_you_mean, listed
 
 SKIN = 0.01
 """How far markers usually are from where a rigid segment has them (m): skin moves."""

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.document.printer import to_text
 from osimlite.fitting.measuring import Measured, scale_set
 from osimlite.fitting.person import Person
-from osimlite.multibody.schema_frames import Placements
+from osimlite.io.document.printer import to_text
+from osimlite.mechanics.multibody.schema_frames import Placements
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.markers import MarkerSet
 from osimlite.schema.tools.scale import GenericModelMaker, MarkerPlacer, ModelScaler, ScaleTool

@@ -6,20 +6,20 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from osimlite.base.records import dataclass
 from osimlite.errors import SettingError
 from osimlite.fitting.fitted_motion import FittedMotion
 from osimlite.fitting.ik_tool import tasks_of, told
 from osimlite.fitting.inverse_kinematics import fitted
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.measuring import frames_between
-from osimlite.multibody import build_mechanism
-from osimlite.records import dataclass
+from osimlite.io.tables.old_storage import printed
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
 from osimlite.schema.tools.inverse_kinematics import IKTask
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.files.old_storage import printed
-from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.states import StateLayout, in_model_order
 
 

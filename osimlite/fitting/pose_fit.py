@@ -7,17 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.records import replace
 from osimlite.errors import SimulationError
 from osimlite.fitting.pose_layout import FitLayout, Goal, Marker, Sensor, substituted
-from osimlite.kernels import pose_record as fit
-from osimlite.kernels.pointers import Floats, Ints
-from osimlite.kernels.pose_fit import APART, STUCK, UNSEEN
-from osimlite.multibody.constraints import Lock, Prescribed
-from osimlite.multibody.functions import Function
-from osimlite.multibody.links import Places
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
-from osimlite.records import replace
+from osimlite.mechanics.kernels import pose_record as fit
+from osimlite.mechanics.kernels.pointers import Floats, Ints
+from osimlite.mechanics.kernels.pose_fit import APART, STUCK, UNSEEN
+from osimlite.mechanics.multibody.constraints import Lock, Prescribed
+from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.constrained import free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.linking import Code

@@ -6,16 +6,16 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from osimlite.kernels import pose_record as fit
-from osimlite.kernels.layout import CONSTRAINED, LINK, MODEL, MOTION, OPERATION
-from osimlite.kernels.least_squares import factor_room
-from osimlite.kernels.pointers import Floats, Ints
-from osimlite.kernels.pose_fit import POSES
-from osimlite.multibody.constraints import Constraint, Coupler
-from osimlite.multibody.function_tables import function_table
-from osimlite.multibody.links import Places
-from osimlite.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.kernels import pose_record as fit
+from osimlite.mechanics.kernels.layout import CONSTRAINED, LINK, MODEL, MOTION, OPERATION
+from osimlite.mechanics.kernels.least_squares import factor_room
+from osimlite.mechanics.kernels.pointers import Floats, Ints
+from osimlite.mechanics.kernels.pose_fit import POSES
+from osimlite.mechanics.multibody.constraints import Constraint, Coupler
+from osimlite.mechanics.multibody.function_tables import function_table
+from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
 from osimlite.simulation.system import System
 
 SCAN = 2001

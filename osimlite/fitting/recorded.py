@@ -8,10 +8,10 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite.base.records import dataclass
+from osimlite.base.text import did_you_mean, listed
 from osimlite.errors import DocumentError, OsimliteError, SettingError
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
-from osimlite.text import did_you_mean, listed
+from osimlite.mechanics.multibody.spatial import Array
 
 
 @dataclass(frozen=True, eq=False)

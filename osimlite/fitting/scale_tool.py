@@ -6,9 +6,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from osimlite.document.kept import read_anew
-from osimlite.document.printer import to_text
-from osimlite.document.reader import read_any
+from osimlite.base.records import dataclass, field
+from osimlite.base.text import did_you_mean
 from osimlite.errors import DocumentError, SettingError
 from osimlite.fitting.ik_tool import UNNAMED, coordinate_table
 from osimlite.fitting.marker_data import MarkerData
@@ -17,7 +16,10 @@ from osimlite.fitting.measuring import Measured, Measuring, scale_set
 from osimlite.fitting.placing import Placed, place_markers, pose_text
 from osimlite.fitting.scaling import scale_model
 from osimlite.fitting.unknown_classes import describe_unknown
-from osimlite.records import dataclass, field
+from osimlite.io.document.kept import read_anew
+from osimlite.io.document.printer import to_text
+from osimlite.io.document.reader import read_any
+from osimlite.io.tables.times import both_of
 from osimlite.schema.base import Object
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.markers import MarkerSet
@@ -32,8 +34,6 @@ from osimlite.schema.tools.scale import (
     Scale,
     ScaleTool,
 )
-from osimlite.simulation.files.times import both_of
-from osimlite.text import did_you_mean
 
 MEASUREMENTS, BY_HAND = "measurements", "manualScale"
 """What a `scaling_order` may consist of."""

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import ModelError
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.schema_frames import Placements
-from osimlite.multibody.spatial import Array, rotation_xyz
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.schema_frames import Placements
+from osimlite.mechanics.multibody.spatial import Array, rotation_xyz
 from osimlite.schema.base import Component
 from osimlite.schema.constraint_types import CoordinateCouplerConstraint
 from osimlite.schema.coordinates import Coordinate

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.spatial import Array
 
 SIDES = {"r": "l", "l": "r", "right": "left", "left": "right"}
 """What is said of one side of the body, and of the other."""

@@ -11,16 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.text import did_you_mean, listed
 from osimlite.errors import SettingError
 from osimlite.fitting.orientation_data import OrientationData
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.mechanism import FramePlacement, Mechanism
-from osimlite.multibody.parts import GROUND
-from osimlite.multibody.spatial import Array, angles_xyz, rotation_about_space
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism
+from osimlite.mechanics.multibody.parts import GROUND
+from osimlite.mechanics.multibody.spatial import Array, angles_xyz, rotation_about_space
 from osimlite.schema.frames import Body, PhysicalFrame, PhysicalOffsetFrame
 from osimlite.schema.markers import IMU
 from osimlite.schema.model import Model
-from osimlite.text import did_you_mean, listed
 
 ENDING = "_imu"
 """What the name of a sensor has behind that of the frame that it is worn on."""

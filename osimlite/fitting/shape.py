@@ -14,10 +14,10 @@ from osimlite.fitting.pose_fit import PoseFit
 from osimlite.fitting.pose_layout import Marker, substituted
 from osimlite.fitting.scaling import scale_model
 from osimlite.fitting.segments import Segments
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.constraints import Lock, Prescribed
-from osimlite.multibody.mechanism import Mechanism, StationPlacement
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.constraints import Lock, Prescribed
+from osimlite.mechanics.multibody.mechanism import Mechanism, StationPlacement
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.markers import Marker as ModelMarker
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.fitting.pose_layout import Goal, Marker, Sensor
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.parts import GROUND
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.parts import GROUND
+from osimlite.mechanics.multibody.spatial import Array
 
 MOST_FRAMES = 5
 """Frames in which the fit is examined; a coordinate is reported if all of them leave it open."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from osimlite.base.text import counted, listed
 from osimlite.schema.base import Unknown
 from osimlite.schema.model import Model
-from osimlite.text import counted, listed
 
 IGNORED = "without effect on the fit"
 """What becomes of parts of unknown classes where a motion is fitted to markers."""

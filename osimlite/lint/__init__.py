@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from osimlite.files import named_mesh_folders
+from osimlite.base.files import named_mesh_folders
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Finding, Report, Severity
 from osimlite.lint.suffixes import project_files
@@ -13,8 +13,8 @@ from osimlite.lint.suffixes import project_files
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from osimlite.document.plugins import Paths
-    from osimlite.document.source import Source
+    from osimlite.io.document.plugins import Paths
+    from osimlite.io.document.source import Source
     from osimlite.lint.engine import all_rules
     from osimlite.schema.model import Model
 
@@ -43,9 +43,9 @@ def validate(
         MissingFileError: the file is missing or cannot be read. What is wrong inside a file is a finding.
         OsimliteError: no rule has a code in `select` or `ignore`, or a class is declared wrongly.
     """
-    from osimlite.document.plugins import used
-    from osimlite.document.reader import collector_paused
-    from osimlite.document.source import Source
+    from osimlite.io.document.plugins import used
+    from osimlite.io.document.reader import collector_paused
+    from osimlite.io.document.source import Source
     from osimlite.lint.engine import check_source, run
     from osimlite.lint.subject import Subject
     from osimlite.schema.model import Model

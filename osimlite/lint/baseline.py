@@ -7,10 +7,10 @@ import os
 from collections import Counter
 from pathlib import Path
 
+from osimlite.base.files import read_file, write_atomically
+from osimlite.base.records import replace
 from osimlite.errors import OsimliteError
-from osimlite.files import read_file, write_atomically
 from osimlite.lint.diagnostic import Finding, Report
-from osimlite.records import replace
 
 _FORMAT = 1
 

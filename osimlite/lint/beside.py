@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from osimlite.document.kept import top_at, while_unchanged
+from osimlite.base.files import read_at_most, read_file
 from osimlite.errors import OsimliteError
-from osimlite.files import read_at_most, read_file
+from osimlite.io.document.kept import top_at, while_unchanged
 from osimlite.lint.suffixes import DOCUMENTS, begins_as_ours
 from osimlite.lint.table import Table
 from osimlite.schema.model import Model

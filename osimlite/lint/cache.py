@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
 from osimlite import __version__
-from osimlite._require import absent
+from osimlite.base.files import read_file, stamped
+from osimlite.base.pruning import mark_used
+from osimlite.base.require import absent
+from osimlite.base.writing import write_cached
 from osimlite.errors import OsimliteError
-from osimlite.files import read_file, stamped
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Report, Severity
-from osimlite.pruning import mark_used
-from osimlite.writing import write_cached
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
+from osimlite.base.records import dataclass, field
 from osimlite.errors import OsimliteError
 from osimlite.lint.diagnostic import Severity
-from osimlite.records import dataclass, field
 
 if TYPE_CHECKING:
     from osimlite.lint.engine import Rule
@@ -71,8 +71,8 @@ class Config:
 
 
 def _check_thresholds(given: Mapping[str, float]) -> None:
+    from osimlite.base.text import did_you_mean
     from osimlite.lint.engine import all_rules
-    from osimlite.text import did_you_mean
 
     known = [threshold.name for rule in all_rules() for threshold in rule.thresholds]
     for name, number in given.items():
@@ -98,7 +98,7 @@ def checked_words(words: tuple[str, ...] | list[str] | str | None) -> tuple[str,
 
     for word in cleaned:
         if not any(rule.matches(word) for rule in all_rules()):
-            from osimlite.text import did_you_mean
+            from osimlite.base.text import did_you_mean
 
             known = [name for rule in (*all_rules(), *groups()) for name in (rule.code, rule.name)]
             near = did_you_mean(word, known) or "; 'osimlite rule' lists all rules"

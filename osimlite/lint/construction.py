@@ -1,6 +1,6 @@
 """Reasons why a model cannot be computed, for the rules that report them.
 
-The linter works without a numeric library. `osimlite.measuring.construction` builds the mechanism
+The linter works without a numeric library. `osimlite.lint.measuring.construction` builds the mechanism
 and the forces, assembles the default pose and evaluates one acceleration. It is loaded by its name,
 and only for models whose construction may fail.
 """
@@ -13,7 +13,7 @@ from hashlib import blake2b
 from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple, cast
 
-from osimlite._require import absent
+from osimlite.base.require import absent
 from osimlite.errors import OsimliteError
 from osimlite.lint.measures import MECHANISM, NEEDS_SIM
 
@@ -160,7 +160,7 @@ def _try_construction(subject: Subject) -> list[Obstacle]:
     from osimlite.schema.tree import lent
 
     assert subject.model is not None
-    try_construction = import_module("osimlite.measuring.construction").try_construction
+    try_construction = import_module("osimlite.lint.measuring.construction").try_construction
     with lent(subject.tree):
         try:
             result: list[Obstacle]

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from osimlite._lazy import shown_in_notebooks
-from osimlite.records import dataclass, field
-from osimlite.text import visible
+from osimlite.base.lazy import shown_in_notebooks
+from osimlite.base.records import dataclass, field
+from osimlite.base.text import visible
 
 
 class Severity(StrEnum):

@@ -12,10 +12,12 @@ from inspect import cleandoc
 from pkgutil import iter_modules
 from typing import Any, Literal, Unpack
 
-from osimlite.document.reader import collector_paused
-from osimlite.document.source import Position, Source
-from osimlite.document.survey import Survey, survey
+from osimlite.base.records import dataclass, replace
+from osimlite.base.text import brief, listed
 from osimlite.errors import SpecialFileError
+from osimlite.io.document.reader import collector_paused
+from osimlite.io.document.source import Position, Source
+from osimlite.io.document.survey import Survey, survey
 from osimlite.lint import rules
 from osimlite.lint.checked import Checked, Where
 from osimlite.lint.config import Config, Threshold
@@ -26,11 +28,9 @@ from osimlite.lint.measures import MEASURES
 from osimlite.lint.subject import Subject
 from osimlite.lint.suffixes import is_document, is_table
 from osimlite.lint.suppressions import Suppression
-from osimlite.records import dataclass, replace
 from osimlite.schema.base import Object
 from osimlite.schema.model import Model
 from osimlite.schema.registry import let_count
-from osimlite.text import brief, listed
 
 ERROR, WARNING, INFO = Severity.ERROR, Severity.WARNING, Severity.INFO
 
@@ -272,7 +272,7 @@ def use_classes(config: Config | None) -> None:
     if config is None or not config.classes:
         let_count({})
         return
-    from osimlite.document.plugins import use
+    from osimlite.io.document.plugins import use
 
     use(config.classes)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from bisect import bisect_left, insort
 from collections.abc import Iterable
 
-from osimlite.document.escape import escape
-from osimlite.document.source import Position, Source
 from osimlite.errors import OsimliteError
+from osimlite.io.document.escape import escape
+from osimlite.io.document.source import Position, Source
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Report
 from osimlite.lint.suffixes import is_table
 

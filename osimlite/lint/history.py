@@ -6,11 +6,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from osimlite.base.text import listed
 from osimlite.errors import OsimliteError
 from osimlite.schema.base import Object
 from osimlite.schema.model import CURRENT_VERSION
 from osimlite.schema.specs import FieldSpec, field_specs
-from osimlite.text import listed
 
 NEWEST = "4.6"
 """The release whose classes osimlite has."""

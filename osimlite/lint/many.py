@@ -10,15 +10,15 @@ from pathlib import Path
 from time import time_ns
 from typing import NamedTuple
 
-from osimlite._cores import cores
+from osimlite.base.cores import cores
+from osimlite.base.files import read_standard_input
+from osimlite.base.records import replace
+from osimlite.base.writing import user_cache_folder
 from osimlite.errors import MissingFileError
-from osimlite.files import read_standard_input
 from osimlite.lint.cache import Cache, key_of, text_of
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report, merged
 from osimlite.lint.settings import Settings, settings_for
-from osimlite.records import replace
-from osimlite.writing import user_cache_folder
 
 WORTH_SHARING = 4_000_000
 """Bytes of models from which on further processes are started; checking takes about a second for 15 MB."""
@@ -86,7 +86,7 @@ class Texts(dict[str, str]):
     """The text of each file, read again when it is asked for: a thousand models are not kept in memory."""
 
     def __missing__(self, file: str) -> str:
-        from osimlite.document.source import Source
+        from osimlite.io.document.source import Source
 
         try:
             return Source.of_file(file).text
@@ -160,7 +160,7 @@ def check_one(job: Job) -> Report:
 
 
 def _standard_input(config: Config, texts: dict[str, str]) -> Report:
-    from osimlite.document.source import Source
+    from osimlite.io.document.source import Source
     from osimlite.lint.engine import check_source
 
     source = Source(read_standard_input(), "<stdin>")

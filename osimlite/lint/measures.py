@@ -1,6 +1,6 @@
 """What is measured of the paths and muscles of a model, for the rules that are about it.
 
-The linter computes without a numeric library. Numbers that need one come from :mod:`osimlite.measuring`, which stands
+The linter computes without a numeric library. Numbers that need one come from :mod:`osimlite.lint.measuring`, which stands
 above linter and simulation: it is loaded by its name, for a model that has something to measure.
 """
 
@@ -11,9 +11,9 @@ from importlib import import_module
 from math import degrees
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
-from osimlite._require import absent
+from osimlite.base.require import absent
+from osimlite.base.text import listed
 from osimlite.errors import OsimliteError
-from osimlite.text import listed
 
 if TYPE_CHECKING:
     from osimlite.lint.subject import Subject
@@ -183,7 +183,7 @@ def unmeasured(subject: Subject, *, anew: bool = True) -> str:
     if not anew:
         return "nobody asked"
     try:
-        measured = import_module("osimlite.measuring").measured
+        measured = import_module("osimlite.lint.measuring").measured
         assert subject.model is not None
         known_of = None if parts is None or known is None else (known.measures, known.of(parts))
         with lent(subject.tree):

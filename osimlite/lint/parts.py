@@ -10,12 +10,12 @@ from collections import OrderedDict
 from hashlib import blake2b
 from typing import TYPE_CHECKING, NamedTuple
 
+from osimlite.base.files import read_file
+from osimlite.base.pruning import mark_used
+from osimlite.base.writing import write_cached
 from osimlite.errors import OsimliteError
-from osimlite.files import read_file
 from osimlite.lint.measures import Measures, of_owners
-from osimlite.pruning import mark_used
 from osimlite.schema.specs import lineage
-from osimlite.writing import write_cached
 
 if TYPE_CHECKING:
     from pathlib import Path

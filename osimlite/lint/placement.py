@@ -15,11 +15,30 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from osimlite.errors import OsimliteError
-from osimlite.forces.rotations import Axes, X, Y, Z, about_axis, along_axes, body_fixed, transposed, turned_axes
-from osimlite.forces.vectors import ZERO, Vector, along, elementwise, norm, over, plus, times
 from osimlite.lint.axes import axes_of, coordinates_of
 from osimlite.lint.skeleton import skeleton
 from osimlite.lint.subject import Subject, once
+from osimlite.mechanics.laws.rotations import (
+    Axes,
+    X,
+    Y,
+    Z,
+    about_axis,
+    along_axes,
+    body_fixed,
+    transposed,
+    turned_axes,
+)
+from osimlite.mechanics.laws.vectors import (
+    ZERO,
+    Vector,
+    along,
+    elementwise,
+    norm,
+    over,
+    plus,
+    times,
+)
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame
 from osimlite.schema.functions import Constant, GCVSpline, PiecewiseLinearFunction, SimmSpline
@@ -27,7 +46,7 @@ from osimlite.schema.joints import EllipsoidJoint, GimbalJoint, Joint
 from osimlite.schema.tree import is_a
 
 if TYPE_CHECKING:
-    from osimlite.multibody.functions import Function
+    from osimlite.mechanics.multibody.functions import Function
     from osimlite.schema.custom_joint import CustomJoint, TransformAxis
 
 
@@ -163,7 +182,7 @@ def _ways(subject: Subject, rough: bool) -> dict[int, list[_Way]]:
 
 def _function(axis: TransformAxis, rough: bool) -> Function | None:
     """What an axis moves by; None if that is not known."""
-    from osimlite.multibody.schema_functions import numeric
+    from osimlite.mechanics.multibody.schema_functions import numeric
 
     function: Any = axis.function
     if isinstance(function, GCVSpline):

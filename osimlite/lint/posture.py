@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from osimlite.forces.vectors import Vector
+from osimlite.io.tables.headers import StorageHeader
 from osimlite.lint.placement import Pose, on_base, poses_at
 from osimlite.lint.setup import Setup
 from osimlite.lint.subject import Subject, once
 from osimlite.lint.table import Table
+from osimlite.mechanics.laws.vectors import Vector
 from osimlite.schema.states import motions_of
 from osimlite.schema.tree import is_a
-from osimlite.tables import StorageHeader
 
 
 def angles_of(setup: Setup) -> set[str]:

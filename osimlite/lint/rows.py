@@ -5,8 +5,8 @@ from __future__ import annotations
 from array import array
 from typing import NamedTuple
 
-from osimlite.records import dataclass, field
-from osimlite.text import counted
+from osimlite.base.records import dataclass, field
+from osimlite.base.text import counted
 
 _TOLD = 50
 """Faults of a kind that are told, one for each column."""

@@ -13,9 +13,9 @@ from itertools import groupby, islice, pairwise
 from math import inf, nan, nextafter
 from operator import lt
 
+from osimlite.base.records import dataclass, field
 from osimlite.lint.rows import Fault, Rows
 from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, shapes
-from osimlite.records import dataclass, field
 
 BLOCK = 16_000
 """Bytes that are looked at together: few enough for the fastest memory of a processor."""

@@ -8,13 +8,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from osimlite.base.files import named_mesh_folders
+from osimlite.base.project import largest_file_in, settings_table
+from osimlite.base.records import dataclass, field
+from osimlite.base.text import did_you_mean, listed
 from osimlite.errors import OsimliteError
-from osimlite.files import named_mesh_folders
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Severity
-from osimlite.project import largest_file_in, settings_table
-from osimlite.records import dataclass, field
-from osimlite.text import did_you_mean, listed
 
 _KNOWN = (
     "select", "ignore", "per-file-ignores", "severity", "mesh-paths", "fail-on", "thresholds", "largest-file",

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from itertools import chain
 from typing import NamedTuple, cast
 
+from osimlite.base.records import dataclass, field
 from osimlite.lint.subject import Subject, once
-from osimlite.multibody.topology import new_base, spanning_tree
-from osimlite.records import dataclass, field
+from osimlite.mechanics.multibody.topology import new_base, spanning_tree
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.frames import Body, Ground, StationDefinedFrame

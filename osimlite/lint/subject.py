@@ -9,10 +9,10 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, cast
 
-from osimlite.document.notes import Note
-from osimlite.document.source import Position
-from osimlite.document.survey import Survey
 from osimlite.errors import DocumentError, SpecialFileError
+from osimlite.io.document.notes import Note
+from osimlite.io.document.source import Position
+from osimlite.io.document.survey import Survey
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.construction import CONSTRUCTION, find_obstacles, may_fail
@@ -24,7 +24,7 @@ from osimlite.schema.specs import FieldSpec, file_specs, lineage
 from osimlite.schema.tree import Resolution, Tree, Use
 
 if TYPE_CHECKING:
-    from osimlite.document.upgrade.draft import Change, Refusal
+    from osimlite.io.document.upgrade.draft import Change, Refusal
     from osimlite.lint.engine import Rule
 
 T = TypeVar("T", bound=Object)

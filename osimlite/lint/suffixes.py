@@ -6,9 +6,9 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
+from osimlite.base.files import TABLES as TABLES
+from osimlite.base.files import no_such, read_at_most, unsaved
 from osimlite.errors import OsimliteError
-from osimlite.files import TABLES as TABLES
-from osimlite.files import no_such, read_at_most, unsaved
 from osimlite.lint.ours import BEGINNING, is_ours
 
 DOCUMENTS = (".xml", ".omoco")

@@ -8,9 +8,9 @@ from bisect import bisect_left
 from collections.abc import Callable
 from operator import attrgetter
 
-from osimlite.document.source import Position, Source
+from osimlite.base.records import dataclass, field
+from osimlite.io.document.source import Position, Source
 from osimlite.lint.diagnostic import Finding
-from osimlite.records import dataclass, field
 
 _COMMENT = re.compile(r"<!--\s*osimlite:\s*ignore\b([^<>]*?)-->")
 _LINE = re.compile(r"^\W*osimlite:\s*ignore\b(.*)$")

@@ -8,14 +8,14 @@ from functools import cached_property
 from itertools import islice, pairwise
 from typing import ClassVar
 
-from osimlite.document.source import Position
+from osimlite.io.document.source import Position
+from osimlite.io.tables.headers import MARK, Entry, MarkerHeader, StorageHeader, Word
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.rows import Rows
 from osimlite.lint.scan import Scan, number_in
 from osimlite.lint.suppressions import Suppression, suppressions_in_header
-from osimlite.tables import MARK, Entry, MarkerHeader, StorageHeader, Word
 
 _CELL = re.compile(rb"[^ \t\r\n]+")
 _ROW = re.compile(rb"[^ \t\r\n][^\n]*")

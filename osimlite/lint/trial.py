@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from math import isfinite, nan
 from typing import ClassVar, NamedTuple
 
-from osimlite.document.source import Position
+from osimlite.io.document.source import Position
 from osimlite.lint.checked import Checked
 from osimlite.lint.config import Config, Threshold
 from osimlite.lint.diagnostic import Severity

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from osimlite.document.lexical import shortest
+from osimlite.base.text import listed, nearest
+from osimlite.io.document.lexical import shortest
 from osimlite.schema.base import Object, Unknown
-from osimlite.text import listed, nearest
 
 
 def called(item: Object) -> str:

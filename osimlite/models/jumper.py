@@ -14,6 +14,7 @@ from math import pi, radians
 from pathlib import Path
 from typing import NamedTuple
 
+from osimlite.io.tables.table_stream import TableStream
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.coordinates import Coordinate
@@ -25,9 +26,15 @@ from osimlite.schema.geometry import Ellipsoid, Geometry, Sphere
 from osimlite.schema.joints import PinJoint, PlanarJoint
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
-from osimlite.schema.paths import AbstractPathPoint, GeometryPath, PathPoint, PathPointSet, PathWrap, PathWrapSet
+from osimlite.schema.paths import (
+    AbstractPathPoint,
+    GeometryPath,
+    PathPoint,
+    PathPointSet,
+    PathWrap,
+    PathWrapSet,
+)
 from osimlite.schema.wrapping import WrapCylinder
-from osimlite.simulation.files.table_stream import TableStream
 
 CONTROLS = Path(__file__).with_name("jumper_controls.sto")
 """The excitations of the jump; ``docs/jumping.md`` tells how they were found."""

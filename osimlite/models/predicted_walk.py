@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.document.printer import write
+from osimlite.fitting.modifying.words import modify
+from osimlite.io.document.printer import write
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.models.walking import human
-from osimlite.modifying.words import modify
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.spatial import Array
 from osimlite.optimal.trajectory import MocoTrajectory
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.coordinates import Coordinate

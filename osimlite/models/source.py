@@ -10,12 +10,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, get_type_hints
 
-from osimlite._load import errors_placed, imports_beside, module_named, module_of_file
-from osimlite.document.data import SUFFIXES, read_data
+from osimlite.base.load import errors_placed, imports_beside, module_named, module_of_file
+from osimlite.base.text import did_you_mean, listed
 from osimlite.errors import MissingDependency, OsimliteError
+from osimlite.io.document.data import SUFFIXES, read_data
 from osimlite.models import BUILT_IN, STUDIES
 from osimlite.schema.model import Model
-from osimlite.text import did_you_mean, listed
 
 _WORDS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 

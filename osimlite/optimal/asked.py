@@ -9,15 +9,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from osimlite.base.files import read_file
+from osimlite.base.text import did_you_mean, listed
 from osimlite.errors import DocumentError, OsimliteError, UnsupportedError
-from osimlite.files import read_file
+from osimlite.io.tables.storage import beside
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Value, domain_test
 from osimlite.schema.patterns import Pattern, PatternError, UnsupportedPatternError
 from osimlite.schema.registry import MODULES
 from osimlite.schema.specs import FieldSpec, value_specs
-from osimlite.simulation.files.storage import beside
-from osimlite.text import did_you_mean, listed
 
 
 @contextmanager

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.actuators import ActivationCoordinateActuator, ScalarActuator
 from osimlite.schema.base import Component
 from osimlite.schema.moco.parts import MocoVariableInfo

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.document.kept import read_anew
-from osimlite.multibody.spatial import Array
+from osimlite.base.text import did_you_mean
+from osimlite.io.document.kept import read_anew
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.asked import Asked
 from osimlite.optimal.point import Series
 from osimlite.optimal.problem import Problem
@@ -16,7 +17,6 @@ from osimlite.optimal.tables import splines
 from osimlite.schema.moco.tracking import MocoContactImpulseTrackingGoal, MocoContactTrackingGoal
 from osimlite.schema.prescribed import ExternalLoads
 from osimlite.simulation.elements.external_loads import loads_table
-from osimlite.text import did_you_mean
 
 Goal = MocoContactTrackingGoal | MocoContactImpulseTrackingGoal
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from osimlite.backends.symbols import casadi
+from osimlite.derivatives.symbols import casadi
 from osimlite.optimal.point import Formula, Point
 from osimlite.optimal.tendons import Tendons
 

@@ -6,19 +6,19 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from osimlite.backends.symbols import casadi
+from osimlite.base.records import dataclass
+from osimlite.derivatives.symbols import casadi
 from osimlite.errors import DocumentError
-from osimlite.multibody.spatial import Array, quaternion
+from osimlite.io.tables.headers import suffixes
+from osimlite.io.tables.storage import StoTable, read_sto
+from osimlite.mechanics.multibody.spatial import Array, quaternion
 from osimlite.optimal.point import Formula, Frame, Point, Terms, integral
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.tables import splines, table_of
-from osimlite.records import dataclass
 from osimlite.schema.base import Component
 from osimlite.schema.moco.goals import MocoGoal
 from osimlite.schema.moco.parts import MocoWeightSet
 from osimlite.schema.tools.processors import TableProcessor
-from osimlite.simulation.files.storage import StoTable, read_sto
-from osimlite.tables import suffixes
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,16 +13,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from osimlite.backends.functions import casadi as functions_of
-from osimlite.backends.symbols import casadi
+from osimlite.derivatives.functions import casadi as functions_of
+from osimlite.derivatives.symbols import casadi
 from osimlite.errors import UnsupportedError
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.schema_functions import numeric
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.dynamics import Dynamics
 from osimlite.optimal.point import Formula, Point, Series
 from osimlite.optimal.tables import over_time
-from osimlite.schema.actuators import ActivationCoordinateActuator, Actuator, CoordinateActuator, ScalarActuator
+from osimlite.schema.actuators import (
+    ActivationCoordinateActuator,
+    Actuator,
+    CoordinateActuator,
+    ScalarActuator,
+)
 from osimlite.schema.frames import Body
 from osimlite.schema.joints import SliderJoint
 from osimlite.schema.model import Model
@@ -58,7 +63,7 @@ def motion_of(part: PositionMotion, model: Model) -> Motion | str:
 
 
 class GivenMotion:
-    """What :class:`~osimlite.backends.functions.CasadiModel` is for a model that moves by itself, along a given motion.
+    """What :class:`~osimlite.derivatives.functions.CasadiModel` is for a model that moves by itself, along a given motion.
 
     Args:
         model: without the motion.

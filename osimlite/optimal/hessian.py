@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.backends.symbols import casadi
-from osimlite.multibody.spatial import Array
+from osimlite.derivatives.symbols import casadi
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.program import Program
 from osimlite.optimal.sparse import SparseMatrix
 

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.modifying.processing import processed
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.spatial import Array
+from osimlite.base.records import replace
+from osimlite.base.text import did_you_mean
+from osimlite.fitting.modifying.processing import processed
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.asked import Asked
 from osimlite.optimal.given_motion import GivenMotion
 from osimlite.optimal.ipopt import Progress
@@ -19,14 +22,15 @@ from osimlite.optimal.refinement import Refinement
 from osimlite.optimal.solution import MocoSolution, solved
 from osimlite.optimal.tables import Curves, expect_columns, processed_table
 from osimlite.optimal.tool_study import set_times, study_of
-from osimlite.records import replace
-from osimlite.schema.moco.goals import MocoControlGoal, MocoInitialActivationGoal, MocoSumSquaredStateGoal
+from osimlite.schema.moco.goals import (
+    MocoControlGoal,
+    MocoInitialActivationGoal,
+    MocoSumSquaredStateGoal,
+)
 from osimlite.schema.moco.parts import MocoWeight, MocoWeightSet
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoInverse, MocoStudy
 from osimlite.schema.model import Model
 from osimlite.schema.tools.processors import TabOpUseAbsoluteStateNames
-from osimlite.simulation.files.storage import StoTable
-from osimlite.text import did_you_mean
 
 AUXILIARY_WEIGHT = 0.01
 """Of the squares of rates of tendon forces."""

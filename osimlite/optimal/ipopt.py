@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.backends.symbols import casadi
+from osimlite.base.records import dataclass
+from osimlite.derivatives.symbols import casadi
 from osimlite.errors import SimulationError
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.hessian import Hessian
 from osimlite.optimal.program import Program, once
-from osimlite.records import dataclass
 
 MANY = 1500
 """Of fewer variables METIS takes longer than its order saves."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from osimlite.multibody.smoothing_spline import SampledCurves
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.smoothing_spline import SampledCurves
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.bounds import Bounds, middle, range_of, scaling
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from osimlite.backends.symbols import casadi
+from osimlite.base.text import did_you_mean
+from osimlite.derivatives.symbols import casadi
 from osimlite.optimal.point import Formula, Point
 from osimlite.optimal.problem import Problem
 from osimlite.schema.coordinates import Coordinate
@@ -15,7 +16,6 @@ from osimlite.schema.moco.goals import MocoOutputBase
 from osimlite.schema.moco.path_constraints import MocoOutputBoundConstraint
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.kind import DeclaredForce
-from osimlite.text import did_you_mean
 
 TINY = 1e-32
 """Squares of lengths below which a root has no slope."""

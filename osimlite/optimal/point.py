@@ -6,9 +6,9 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from osimlite.backends.symbols import casadi
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, field, replace
+from osimlite.base.records import dataclass, field, replace
+from osimlite.derivatives.symbols import casadi
+from osimlite.mechanics.multibody.spatial import Array
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem

@@ -11,12 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from osimlite._load import module_name
-from osimlite.backends.functions import CasadiModel
-from osimlite.backends.symbols import casadi
+from osimlite.base.load import module_name
+from osimlite.base.records import replace
+from osimlite.derivatives.functions import CasadiModel
+from osimlite.derivatives.symbols import casadi
 from osimlite.errors import SettingError
-from osimlite.modifying.processing import processed
-from osimlite.multibody.spatial import Array
+from osimlite.fitting.modifying.processing import processed
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.asked import MAX_MESH_INTERVALS, MAX_MESH_VALUES, Asked
 from osimlite.optimal.bounds import FREE, Range, control_bounds, range_of, scaling, state_bounds
 from osimlite.optimal.dynamics import Dynamics
@@ -25,7 +27,6 @@ from osimlite.optimal.layout import PROJECTED
 from osimlite.optimal.point import Formula, Point, Rows, Series, Terms, integral
 from osimlite.optimal.schemes import Grid, scheme_named
 from osimlite.optimal.tables import over_time
-from osimlite.records import replace
 from osimlite.schema.base import Component, Object
 from osimlite.schema.controllers import Controller
 from osimlite.schema.coordinates import Coordinate
@@ -34,7 +35,6 @@ from osimlite.schema.moco.parts import MocoParameter, MocoWeightSet
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoStudy
 from osimlite.schema.model import Model
 from osimlite.schema.motions import PositionMotion
-from osimlite.simulation.files.storage import StoTable
 
 NO_RATES = "BallJoint", "EllipsoidJoint", "FreeJoint", "ScapulothoracicJoint"
 """Joints whose speeds are not the rates of their values: Moco refuses them."""
@@ -54,7 +54,7 @@ class Problem(Asked):
     Attributes:
         study: as given; `phase` and `solver` are its parts.
         model: that moves.
-        functions: of the model (:class:`~osimlite.backends.functions.CasadiModel`).
+        functions: of the model (:class:`~osimlite.derivatives.functions.CasadiModel`).
         states: bounds by paths of states, in the order of `functions.states`.
         controls: likewise of the controls of actuators that act; the others are zero.
         times: ranges of the initial and the final time, s.

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.backends.symbols import casadi
-from osimlite.multibody.spatial import Array
+from osimlite.derivatives.symbols import casadi
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.bounds import range_of
 from osimlite.optimal.layout import KINDS, Layout
 from osimlite.optimal.point import Ends, Point

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from osimlite.backends.symbols import casadi
+from osimlite.derivatives.symbols import casadi
 from osimlite.optimal.point import Formula
 from osimlite.optimal.problem import Problem
 from osimlite.schema.moco.path_constraints import MocoFrameDistanceConstraint

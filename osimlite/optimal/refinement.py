@@ -13,16 +13,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from osimlite.base.records import dataclass
+from osimlite.base.text import or_known
 from osimlite.errors import SettingError
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.ipopt import Found, Progress
 from osimlite.optimal.ipopt import solve as search
 from osimlite.optimal.layout import KINDS
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
 from osimlite.optimal.schemes import Grid
-from osimlite.records import dataclass
-from osimlite.text import or_known
 
 SAMPLES, WEIGHTS = (0.5 * part for part in np.polynomial.legendre.leggauss(4))
 SAMPLES = SAMPLES + 0.5

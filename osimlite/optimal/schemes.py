@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.backends.symbols import casadi
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.derivatives.symbols import casadi
+from osimlite.mechanics.multibody.spatial import Array
 
 
 @dataclass(frozen=True, eq=False)

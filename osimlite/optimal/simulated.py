@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.given_motion import GivenMotion
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.trajectory import MocoTrajectory
-from osimlite.records import dataclass
 from osimlite.simulation.run import simulate
 
 ACCURACY = 1e-7

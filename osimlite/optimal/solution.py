@@ -6,9 +6,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from osimlite.document.reader import read_document
-from osimlite.document.source import Source
+from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
+from osimlite.io.document.reader import read_document
+from osimlite.io.document.source import Source
+from osimlite.io.tables.storage import StoTable
 from osimlite.optimal.asked import in_file
 from osimlite.optimal.ipopt import Progress, Violation, violations
 from osimlite.optimal.ipopt import solve as search
@@ -17,9 +19,7 @@ from osimlite.optimal.program import Program
 from osimlite.optimal.refinement import Refinement, Round, refined
 from osimlite.optimal.stride import stride
 from osimlite.optimal.trajectory import MocoTrajectory
-from osimlite.records import dataclass
 from osimlite.schema.moco.studies import MocoStudy
-from osimlite.simulation.files.storage import StoTable
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.multibody.spatial import Array
 
 
 @dataclass(frozen=True, eq=False)

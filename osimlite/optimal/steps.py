@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from osimlite.backends.symbols import casadi
+from osimlite.base.text import did_you_mean
+from osimlite.derivatives.symbols import casadi
 from osimlite.optimal.point import Formula
 from osimlite.optimal.problem import Problem
 from osimlite.schema.contact import ContactSphere
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.moco.goals import MocoGoal
-from osimlite.text import did_you_mean
 
 
 def along(direction: str, vector: Sequence[Formula] | Formula) -> Formula:

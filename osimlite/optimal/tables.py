@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from osimlite.base.records import replace
 from osimlite.errors import DocumentError
 from osimlite.fitting.marker_data import MarkerData
-from osimlite.multibody.constraints import Coupler
-from osimlite.multibody.functions import Function
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.smoothing_spline import SampledCurves
-from osimlite.multibody.spatial import Array
+from osimlite.io.tables.storage import StoTable, read_sto
+from osimlite.mechanics.multibody.constraints import Coupler
+from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.smoothing_spline import SampledCurves
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.asked import Asked
 from osimlite.optimal.layout import FEWEST
 from osimlite.optimal.point import Series
-from osimlite.records import replace
 from osimlite.schema.base import Object
 from osimlite.schema.tools.processors import (
     TableProcessor,
@@ -28,7 +29,6 @@ from osimlite.schema.tools.processors import (
     TabOpLowPassFilter,
     TabOpUseAbsoluteStateNames,
 )
-from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.simulation.lowpass import lowpassed
 
 if TYPE_CHECKING:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from osimlite.backends.symbolic import on_symbols
-from osimlite.backends.symbols import casadi
-from osimlite.forces.muscles import MuscleInputs
-from osimlite.forces.smooth_muscles import (
+from osimlite.derivatives.symbolic import on_symbols
+from osimlite.derivatives.symbols import casadi
+from osimlite.mechanics.laws.muscles import MuscleInputs
+from osimlite.mechanics.laws.smooth_muscles import (
     BELOW,
     SmoothMuscle,
     SmoothTendon,

@@ -7,12 +7,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from osimlite.io.tables.storage import StoTable
 from osimlite.optimal.asked import MAX_MESH_INTERVALS, Asked
 from osimlite.schema.moco.parts import MocoFinalBounds, MocoInitialBounds
-from osimlite.schema.moco.studies import MocoCasADiSolver, MocoInverse, MocoPhase, MocoProblem, MocoStudy, MocoTrack
+from osimlite.schema.moco.studies import (
+    MocoCasADiSolver,
+    MocoInverse,
+    MocoPhase,
+    MocoProblem,
+    MocoStudy,
+    MocoTrack,
+)
 from osimlite.schema.model import Model
 from osimlite.schema.tools.processors import ModelProcessor
-from osimlite.simulation.files.storage import StoTable
 
 
 def study_of(tool: MocoInverse | MocoTrack, model: Model, solver: MocoCasADiSolver) -> MocoStudy:

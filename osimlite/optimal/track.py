@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.modifying.processing import processed
-from osimlite.multibody.smoothing_spline import derivatives_of_samples
+from osimlite.base.records import replace
+from osimlite.fitting.modifying.processing import processed
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.optimal.ipopt import Progress
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.program import Program
@@ -17,13 +19,11 @@ from osimlite.optimal.solution import MocoSolution, solved
 from osimlite.optimal.tables import processed_table
 from osimlite.optimal.tool_study import set_times, study_of
 from osimlite.optimal.trajectory import MocoTrajectory
-from osimlite.records import replace
 from osimlite.schema.moco.goals import MocoControlGoal
 from osimlite.schema.moco.parts import MocoWeight, MocoWeightSet
 from osimlite.schema.moco.studies import MocoCasADiSolver, MocoStudy, MocoTrack
 from osimlite.schema.moco.tracking import MocoMarkerTrackingGoal, MocoStateTrackingGoal
 from osimlite.schema.tools.inverse_kinematics import MarkersReference, MarkerWeight, MarkerWeightSet
-from osimlite.simulation.files.storage import StoTable
 
 HALF_ORDER = 3
 """Of the splines whose derivatives are followed; they are of fifth degree."""

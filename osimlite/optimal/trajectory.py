@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from osimlite.base.files import make_folder, written_atomically
+from osimlite.base.records import dataclass, field
 from osimlite.errors import DocumentError
-from osimlite.files import make_folder, written_atomically
-from osimlite.multibody.spatial import Array
+from osimlite.io.tables.storage import StoTable, adapter_lines, read_sto
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.layout import Layout
-from osimlite.records import dataclass, field
-from osimlite.simulation.files.storage import StoTable, adapter_lines, read_sto
 
 COUNTS = ("states", "controls", "input_controls", "multipliers", "derivatives", "slacks", "parameters")
 """What the header counts, in the order of the columns."""

@@ -6,7 +6,12 @@ from typing import Annotated, ClassVar
 from osimlite.schema.facts import IDLE, STOPS, Facts
 from osimlite.schema.fields import Flag, Number, Vec3, real, vec3
 from osimlite.schema.forces import ForceProducer
-from osimlite.schema.references import BodySocket, MaybeBodyName, MaybeCoordinateName, MaybeFrameName
+from osimlite.schema.references import (
+    BodySocket,
+    MaybeBodyName,
+    MaybeCoordinateName,
+    MaybeFrameName,
+)
 
 
 class Actuator(ForceProducer, abstract=True):

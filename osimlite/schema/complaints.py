@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def misspelt(cls: type[Object], name: str) -> str:
     """There is no property of this name; with the nearest ones."""
-    from osimlite.text import did_you_mean
+    from osimlite.base.text import did_you_mean
 
     known = [field_name for field_name in cls.model_fields]
     # Sockets are known by the middle of their names: ``frame`` is ``socket_frame``.

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from osimlite.base.text import listed
 from osimlite.errors import ModelError
 from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Reference
 from osimlite.schema.model import Model
 from osimlite.schema.resolution import RULES, nothing_to_resolve
 from osimlite.schema.tree import ILLEGAL_CHARACTERS, Tree, Use
-from osimlite.text import listed
 
 _NAME_NOTHING = frozenset(rule for rule, follow in RULES.items() if follow is nothing_to_resolve) - {"input"}
 

@@ -2,7 +2,7 @@
 
 A field of a component class is declared once, ``radius: Annotated[float, real("m", ">= 0")] = 0.0``; the reader, the
 printer, the linter and the catalogue test all work from the marker. Markers hold facts only: how text becomes a value
-is the business of :mod:`osimlite.document.lexical`.
+is the business of :mod:`osimlite.io.document.lexical`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
 from pydantic_core import core_schema
 
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
 
 if TYPE_CHECKING:
     from osimlite.schema.base import Object

@@ -5,7 +5,18 @@ from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, made, none
 from osimlite.schema.facts import OWN, Facts
-from osimlite.schema.fields import LegacyMany, Many, Single, Unnamed, Value, Vec3, Vec6, real, vec3, word
+from osimlite.schema.fields import (
+    LegacyMany,
+    Many,
+    Single,
+    Unnamed,
+    Value,
+    Vec3,
+    Vec6,
+    real,
+    vec3,
+    word,
+)
 from osimlite.schema.geometry import FrameGeometry, Geometry
 from osimlite.schema.references import PhysicalFrameSocket, StationSocket
 from osimlite.schema.sets import ModelComponentSet

@@ -1,7 +1,7 @@
 """The JSON Schema of models and other documents as plain data, generated from the declarations.
 
 ``python -m osimlite.schema.json_schema > schemas/osim-4.6.schema.json`` writes the file that editors use; a test
-keeps it current. :mod:`osimlite.document.data` reads what the schema describes. With the tag of another class, such
+keeps it current. :mod:`osimlite.io.document.data` reads what the schema describes. With the tag of another class, such
 as ``ScaleTool``, the schema is that of its documents.
 """
 

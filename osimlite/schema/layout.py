@@ -5,7 +5,7 @@ from __future__ import annotations
 import weakref
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from osimlite.records import dataclass, field
+from osimlite.base.records import dataclass, field
 
 if TYPE_CHECKING:
     from osimlite.schema.base import Object

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, cast, overload
 
-from osimlite._lazy import shown_in_notebooks
+from osimlite.base.lazy import shown_in_notebooks
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.schema.base import Component, ModelComponent, made
 from osimlite.schema.constraints import ConstraintSet

@@ -8,7 +8,17 @@ from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, made, none
 from osimlite.schema.facts import Facts
-from osimlite.schema.fields import LegacyMany, Many, Optional, Unnamed, Value, Vec3, reals, vec3, word
+from osimlite.schema.fields import (
+    LegacyMany,
+    Many,
+    Optional,
+    Unnamed,
+    Value,
+    Vec3,
+    reals,
+    vec3,
+    word,
+)
 from osimlite.schema.functions import Constant, Function
 from osimlite.schema.geometry import Appearance
 from osimlite.schema.markers import Point, Station

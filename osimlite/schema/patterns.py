@@ -14,7 +14,7 @@ from __future__ import annotations
 import string
 from collections.abc import Callable, Iterable
 
-from osimlite.records import dataclass, field
+from osimlite.base.records import dataclass, field
 
 MAX_STATES = 2000
 """States of one pattern. A repetition such as `x{100}` has the states of `x` a hundred times."""

@@ -7,7 +7,13 @@ from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Flag, LegacyMany, Single
 from osimlite.schema.forces import ForceProducer
 from osimlite.schema.functions import FunctionSet
-from osimlite.schema.references import ExpressedInFrame, FrameName, MaybeColumnName, PhysicalFrameSocket, reads
+from osimlite.schema.references import (
+    ExpressedInFrame,
+    FrameName,
+    MaybeColumnName,
+    PhysicalFrameSocket,
+    reads,
+)
 from osimlite.schema.sets import ModelComponentSet
 
 

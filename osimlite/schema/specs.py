@@ -6,8 +6,18 @@ from collections.abc import Callable
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
-from osimlite.records import replace
-from osimlite.schema.fields import Held, Kind, Legacy, NamesOf, ObjectList, Reference, Tag, Value, class_in
+from osimlite.base.records import replace
+from osimlite.schema.fields import (
+    Held,
+    Kind,
+    Legacy,
+    NamesOf,
+    ObjectList,
+    Reference,
+    Tag,
+    Value,
+    class_in,
+)
 
 if TYPE_CHECKING:
     from osimlite.schema.base import Object

@@ -12,8 +12,9 @@ from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from weakref import WeakSet
 
+from osimlite.base.records import dataclass
+from osimlite.base.text import did_you_mean
 from osimlite.errors import ModelError
-from osimlite.records import dataclass
 from osimlite.schema.base import Component, Object, put_model
 from osimlite.schema.fields import Held, ObjectList, Reference
 from osimlite.schema.resolution import EVERYWHERE, PATH_RULES, RULES, last_name
@@ -22,8 +23,14 @@ from osimlite.schema.resolution import Failure as Failure
 from osimlite.schema.resolution import Resolution as Resolution
 from osimlite.schema.resolution import is_a as is_a
 from osimlite.schema.resolution import normalised as normalised
-from osimlite.schema.specs import FieldSpec, Holding, field_specs, holding, name_spec, reference_specs
-from osimlite.text import did_you_mean
+from osimlite.schema.specs import (
+    FieldSpec,
+    Holding,
+    field_specs,
+    holding,
+    name_spec,
+    reference_specs,
+)
 
 if TYPE_CHECKING:
     from osimlite.schema.model import Model

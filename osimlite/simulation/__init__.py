@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from osimlite._lazy import imported_when_used
+from osimlite.base.lazy import imported_when_used
 
 if TYPE_CHECKING:
-    from osimlite.simulation.files.storage import StoTable as StoTable
-    from osimlite.simulation.files.storage import read_sto as read_sto
-    from osimlite.simulation.files.storage import write_sto as write_sto
-    from osimlite.simulation.files.table_stream import stream_table as stream_table
+    from osimlite.io.tables.storage import StoTable as StoTable
+    from osimlite.io.tables.storage import read_sto as read_sto
+    from osimlite.io.tables.storage import write_sto as write_sto
+    from osimlite.io.tables.table_stream import stream_table as stream_table
     from osimlite.simulation.options import Options as Options
     from osimlite.simulation.run import Simulation as Simulation
     from osimlite.simulation.run import simulate as simulate
@@ -23,11 +23,11 @@ __getattr__ = imported_when_used(
         "Interrupted": "osimlite.simulation.trajectory",
         "Options": "osimlite.simulation.options",
         "Simulation": "osimlite.simulation.run",
-        "StoTable": "osimlite.simulation.files.storage",
+        "StoTable": "osimlite.io.tables.storage",
         "Trajectory": "osimlite.simulation.trajectory",
-        "read_sto": "osimlite.simulation.files.storage",
+        "read_sto": "osimlite.io.tables.storage",
         "simulate": "osimlite.simulation.run",
-        "stream_table": "osimlite.simulation.files.table_stream",
-        "write_sto": "osimlite.simulation.files.storage",
+        "stream_table": "osimlite.io.tables.table_stream",
+        "write_sto": "osimlite.io.tables.storage",
     },
 )

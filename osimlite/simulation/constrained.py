@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.multibody.constraints import Constraint, Lock, Prescribed
-from osimlite.multibody.functions import Constant
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.constraints import Constraint, Lock, Prescribed
+from osimlite.mechanics.multibody.functions import Constant
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 
 
 def free_coordinates(mechanism: Mechanism) -> list[int]:

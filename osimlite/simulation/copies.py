@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite._cores import cores
-from osimlite.kernels.pointers import Floats
-from osimlite.multibody.functions import Constant
-from osimlite.multibody.spatial import Array
+from osimlite.base.cores import cores
+from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.multibody.functions import Constant
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.given_controls import places_of
@@ -88,7 +88,7 @@ class Copies:
         return going > 0
 
     def walk(self, which: Sequence[int], *parts: Any) -> int:
-        """Have copies walk by :func:`osimlite.kernels.walks.walk_several`; returns what that says last."""
+        """Have copies walk by :func:`osimlite.mechanics.kernels.walks.walk_several`; returns what that says last."""
         return self._together("walk_several", [(k, k + 1) for k in which], *parts)
 
     def _together(self, law: str, parts: Sequence[tuple[int, int]], *given: Any) -> int:

@@ -7,7 +7,13 @@ from functools import partial
 from math import inf, isfinite
 
 from osimlite.errors import SettingError
-from osimlite.simulation.stepper import Derivative, IntegrationError, Observer, Stepper, straight_line
+from osimlite.simulation.stepper import (
+    Derivative,
+    IntegrationError,
+    Observer,
+    Stepper,
+    straight_line,
+)
 
 Projected = Callable[[float, list[float], float], list[float] | None]
 FIXED_STEP_TOLERANCE = 1e-9

@@ -9,21 +9,28 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.quantity import tell
+from osimlite.base.records import dataclass
+from osimlite.base.text import did_you_mean, listed
 from osimlite.errors import SettingError, SimulationError
-from osimlite.kernels.layout import ITEM, MODEL
-from osimlite.kernels.pointers import Ints
-from osimlite.multibody.functions import Arguments, Constant, Evaluated, Function, Scaled, zeros
-from osimlite.multibody.schema_functions import numeric
-from osimlite.multibody.smoothing_spline import smoothing_spline
-from osimlite.quantity import tell
-from osimlite.records import dataclass
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.kernels.layout import ITEM, MODEL
+from osimlite.mechanics.kernels.pointers import Ints
+from osimlite.mechanics.multibody.functions import (
+    Arguments,
+    Constant,
+    Evaluated,
+    Function,
+    Scaled,
+    zeros,
+)
+from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
 from osimlite.schema.base import Object
 from osimlite.simulation.elements.control_sets import ControlCurves
 from osimlite.simulation.elements.control_tables import read_controls
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.signals import TableColumn
-from osimlite.simulation.files.storage import StoTable
-from osimlite.text import did_you_mean, listed
 
 PRINTED_S = 1e-6
 """Tolerance of the ends of a table, s: its times were printed with few digits, those of the motion were not."""

@@ -15,14 +15,14 @@ from zlib import crc32
 
 import numpy as np
 
+from osimlite.base.records import dataclass
 from osimlite.errors import SettingError
-from osimlite.kernels.pointers import Floats, Ints
-from osimlite.kernels.reflexes import EARLY_STANCE, REFLEXES, UNKNOWN
-from osimlite.kernels.senses import SENSES
-from osimlite.kernels.walks import COUNTS, FRAMES, LEGS, STEPS
-from osimlite.multibody.functions import Constant, Function, PiecewiseConstant
-from osimlite.records import dataclass
-from osimlite.simulation.files.storage import StoTable
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.kernels.pointers import Floats, Ints
+from osimlite.mechanics.kernels.reflexes import EARLY_STANCE, REFLEXES, UNKNOWN
+from osimlite.mechanics.kernels.senses import SENSES
+from osimlite.mechanics.kernels.walks import COUNTS, FRAMES, LEGS, STEPS
+from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseConstant
 from osimlite.simulation.given_controls import places_of
 from osimlite.simulation.integrators import INITIAL_STEP
 
@@ -70,14 +70,14 @@ class Controller(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """A controller of a model, as the kernels have it (:mod:`osimlite.kernels.walks`)."""
+    """A controller of a model, as the kernels have it (:mod:`osimlite.mechanics.kernels.walks`)."""
 
     paths: tuple[str, ...]  # of the controls, in the order that it has them
     step: float  # for which they are held, s
     sensors: tuple[str, ...]  # what is remembered of a control step
-    senses: Ints  # see :mod:`osimlite.kernels.senses`
+    senses: Ints  # see :mod:`osimlite.mechanics.kernels.senses`
     known: Floats  # its numbers
-    plan: Ints  # see :mod:`osimlite.kernels.reflexes`
+    plan: Ints  # see :mod:`osimlite.mechanics.kernels.reflexes`
     numbers: Floats  # its numbers
     gains: Mapping[str, float]  # what these are made of, by the names that it has for them
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import inf
 
+from osimlite.base.text import or_known
 from osimlite.errors import SettingError
-from osimlite.text import or_known
 
 MERSON = "merson"
 INTEGRATORS = {

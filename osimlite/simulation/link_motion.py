@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite.kernels.layout import LINK_WORK
-from osimlite.multibody.parts import GROUND
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.kernels.layout import LINK_WORK
+from osimlite.mechanics.multibody.parts import GROUND
 
 if TYPE_CHECKING:
     from osimlite.simulation.system import System

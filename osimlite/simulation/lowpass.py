@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from osimlite.errors import SettingError
-from osimlite.multibody.smoothing_spline import derivatives_of_samples
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
+from osimlite.mechanics.multibody.spatial import Array
 
 MOST_SAMPLES = 100_000
 """A record is not sampled more finely than this many times."""

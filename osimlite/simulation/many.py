@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from numpy.typing import ArrayLike
 
+from osimlite.base.records import dataclass
 from osimlite.errors import SettingError
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.records import dataclass
+from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces

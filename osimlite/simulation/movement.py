@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from osimlite._require import require
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
-from osimlite.simulation.tabular import Tabular
+from osimlite.base.require import require
+from osimlite.io.tables.tabular import Tabular
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 
 
 class Movement(Tabular):

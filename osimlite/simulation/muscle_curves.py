@@ -9,15 +9,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from osimlite._lazy import shown_in_notebooks
-from osimlite._require import require
+from osimlite.base.lazy import shown_in_notebooks
+from osimlite.base.records import dataclass, replace
+from osimlite.base.require import require
+from osimlite.base.text import did_you_mean, listed
 from osimlite.errors import SettingError, SimulationError
-from osimlite.kernels.layout import OUTCOME, STAGE
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.extremes import any_numbers
-from osimlite.multibody.functions import Constant
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, replace
+from osimlite.io.tables.tabular import Tabular
+from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.extremes import any_numbers
+from osimlite.mechanics.multibody.functions import Constant
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements import Forces, force_elements
@@ -26,8 +28,6 @@ from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.paths import Paths
 from osimlite.simulation.system import System
-from osimlite.simulation.tabular import Tabular
-from osimlite.text import did_you_mean, listed
 
 Progress = Callable[[int, int], None]
 

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from osimlite.choices import described, option
+from osimlite.base.choices import described, option
+from osimlite.base.records import dataclass, replace
+from osimlite.base.text import or_known
 from osimlite.errors import SettingError
-from osimlite.records import dataclass, replace
-from osimlite.text import or_known
 
 if TYPE_CHECKING:
-    from osimlite.simulation.files.storage import StoTable
+    from osimlite.io.tables.storage import StoTable
     from osimlite.simulation.held import Controller
     from osimlite.simulation.stepper import Progress
     from osimlite.simulation.trajectory import Trajectory
@@ -105,7 +105,7 @@ class Options:
     skip_unsupported: bool = option(False, "Leave out forces that cannot be computed.", more="The summary lists them.")
     opensim_derivatives: bool = option(
         False, "Repeat OpenSim's mistakes in joints with several turns.",
-        more="Two second derivatives there are wrong; see :func:`osimlite.multibody.build_mechanism`.",
+        more="Two second derivatives there are wrong; see :func:`osimlite.mechanics.multibody.build_mechanism`.",
     )  # fmt: skip
     rolling: bool = option(
         False, "Let rolling constraints act, which OpenSim leaves off.",

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from osimlite.kernels.curves_abreast import LANES, ROWS
-from osimlite.kernels.layout import CONTACT_WORK, EQUILIBRIUM, ITEM, MODEL, RESPONSE, RUN
-from osimlite.kernels.pointers import Floats, Ints
-from osimlite.kernels.record import STATES
-from osimlite.multibody.links import LinkPacker, Placement, Tree, tree_of
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.kernels.curves_abreast import LANES, ROWS
+from osimlite.mechanics.kernels.layout import CONTACT_WORK, EQUILIBRIUM, ITEM, MODEL, RESPONSE, RUN
+from osimlite.mechanics.kernels.pointers import Floats, Ints
+from osimlite.mechanics.kernels.record import STATES
+from osimlite.mechanics.multibody.links import LinkPacker, Placement, Tree, tree_of
+from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.constrained import constraints_on, free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.items import CONTROLS, ForceElement, Response

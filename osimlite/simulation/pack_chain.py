@@ -6,11 +6,21 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from osimlite.kernels.layout import CHAIN, DOF, EXCESS, JOINT, JOINT_KIND, MODEL, MOTION, PRODUCT, SHARE
-from osimlite.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
-from osimlite.multibody.parts import GROUND
-from osimlite.robot.lines import as_line
-from osimlite.robot.robot import RobotJoint
+from osimlite.mechanics.kernels.layout import (
+    CHAIN,
+    DOF,
+    EXCESS,
+    JOINT,
+    JOINT_KIND,
+    MODEL,
+    MOTION,
+    PRODUCT,
+    SHARE,
+)
+from osimlite.mechanics.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
+from osimlite.mechanics.multibody.parts import GROUND
+from osimlite.simulation.robot.lines import as_line
+from osimlite.simulation.robot.robot import RobotJoint
 
 if TYPE_CHECKING:
     from osimlite.simulation.pack import Packer

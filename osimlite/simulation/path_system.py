@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from osimlite.base.records import dataclass, replace
 from osimlite.errors import SimulationError
-from osimlite.kernels.layout import OUTCOME, STAGE
-from osimlite.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SURFACE
-from osimlite.kernels.wrapping import SURFACE_LENGTH
-from osimlite.multibody.links import Places
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, replace
+from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
+from osimlite.mechanics.kernels.paths import COUNT, LENGTH, NODE_WORK, ORDER, PLACE, SURFACE
+from osimlite.mechanics.kernels.wrapping import SURFACE_LENGTH
+from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.geometries.path import Path as Along
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.elements.items import Item, Silent

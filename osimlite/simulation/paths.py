@@ -8,16 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite._lazy import shown_in_notebooks
-from osimlite.kernels.paths import LENGTH, SPEED
-from osimlite.kernels.projection import REDUNDANT
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.constraints import Constraint, Lock
-from osimlite.multibody.extremes import any_numbers, methods_of_any_numbers
-from osimlite.multibody.kinematics import Kinematics
-from osimlite.multibody.linear import shortest, stacked
-from osimlite.multibody.mechanism import Mechanism, Values
-from osimlite.multibody.spatial import Array
+from osimlite.base.lazy import shown_in_notebooks
+from osimlite.mechanics.kernels.paths import LENGTH, SPEED
+from osimlite.mechanics.kernels.projection import REDUNDANT
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.constraints import Constraint, Lock
+from osimlite.mechanics.multibody.extremes import any_numbers, methods_of_any_numbers
+from osimlite.mechanics.multibody.kinematics import Kinematics
+from osimlite.mechanics.multibody.linear import shortest, stacked
+from osimlite.mechanics.multibody.mechanism import Mechanism, Values
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 from osimlite.schema.paths import AbstractGeometryPath

@@ -8,13 +8,13 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from osimlite.kernels.layout import ITEM, LINK_WORK, MODEL
-from osimlite.kernels.pointers import Ints
-from osimlite.kernels.table import LAW_NUMBERS
-from osimlite.multibody.constraints import Lock
-from osimlite.multibody.links import Places
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.kernels.layout import ITEM, LINK_WORK, MODEL
+from osimlite.mechanics.kernels.pointers import Ints
+from osimlite.mechanics.kernels.table import LAW_NUMBERS
+from osimlite.mechanics.multibody.constraints import Lock
+from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.items import Item
 from osimlite.simulation.engines.linking import Code, best
 

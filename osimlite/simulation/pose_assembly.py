@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.kernels import assembly
-from osimlite.kernels.layout import CONSTRAINED, MODEL
-from osimlite.kernels.table import LAW_NUMBERS
-from osimlite.multibody.assembly import tolerance_of
-from osimlite.multibody.constraints import Coupler, Lock
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.kernels import assembly
+from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL
+from osimlite.mechanics.kernels.table import LAW_NUMBERS
+from osimlite.mechanics.multibody.assembly import tolerance_of
+from osimlite.mechanics.multibody.constraints import Coupler, Lock
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.engines.linking import AT_HAND, Code, best
 
 ENTRY = "assemble_poses"

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from math import inf
 
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
 from osimlite.simulation.elements.probe import INTEGRATE, DeclaredProbe
 from osimlite.simulation.engines.protocol import Engine
 

@@ -9,15 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite.base.records import dataclass, field
 from osimlite.errors import SettingError
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.records import dataclass, field
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.forces import Force, ForceSet
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.files.recorded import Recorded, RecordedMotion, exclude_forces, excluded_forces
-from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.recorded_motion import (
+    Recorded,
+    RecordedMotion,
+    exclude_forces,
+    excluded_forces,
+)
 
 if TYPE_CHECKING:
     from osimlite.schema.prescribed import ExternalLoads
@@ -136,8 +141,8 @@ def add_forces(model: Model, forces: Iterable[str | Path | Force], *, replace: b
     Raises:
         DocumentError: a file is missing, or no ForceSet.
     """
-    from osimlite.document.reader import read_document
-    from osimlite.document.source import Source
+    from osimlite.io.document.reader import read_document
+    from osimlite.io.document.source import Source
 
     if replace:
         model.force_set.objects.clear()

@@ -11,14 +11,14 @@ from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
+from osimlite.base.quantity import tell, tell_doubt
+from osimlite.base.records import replace
 from osimlite.errors import SettingError, SimulationError
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.constraints import Lock
-from osimlite.multibody.dynamics import require_numbers
-from osimlite.multibody.extremes import any_numbers
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.quantity import tell, tell_doubt
-from osimlite.records import replace
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.constraints import Lock
+from osimlite.mechanics.multibody.dynamics import require_numbers
+from osimlite.mechanics.multibody.extremes import any_numbers
+from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model, expect_model
 from osimlite.schema.snapshot import Snapshot
 from osimlite.simulation.constrained import constraints_on, kept_state
@@ -32,15 +32,22 @@ from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.simulation.recorder import Recorder
 from osimlite.simulation.run_times import check_step
 from osimlite.simulation.run_times import report_times as report_times
-from osimlite.simulation.start import ended, in_units_of, starting, state_at, state_in, suspect_value
+from osimlite.simulation.start import (
+    ended,
+    in_units_of,
+    starting,
+    state_at,
+    state_in,
+    suspect_value,
+)
 from osimlite.simulation.states import in_model_order
 from osimlite.simulation.stepper import Observer, Progress, Stepper
 from osimlite.simulation.summary import integration_summary, result_summary, versions
 from osimlite.simulation.trajectory import Interrupted, Report, Trajectory
 
 if TYPE_CHECKING:
+    from osimlite.io.tables.storage import StoTable
     from osimlite.schema.tree import Tree
-    from osimlite.simulation.files.storage import StoTable
 
 
 def simulate(model: Model, to: float = 2.0, engine: str | None = None, **choices: Any) -> Trajectory:
@@ -167,9 +174,9 @@ class Simulation:
         )
         visuals = None
         if chosen.show:
-            from osimlite.meshes.folders import MeshFolders
-            from osimlite.robot.mesh_files import MeshFiles
-            from osimlite.robot.visuals import collect_visuals
+            from osimlite.io.meshes.folders import MeshFolders
+            from osimlite.simulation.robot.mesh_files import MeshFiles
+            from osimlite.simulation.robot.visuals import collect_visuals
 
             places = MeshFolders(Path.cwd() if chosen.folder is None else Path(chosen.folder))
             visuals = collect_visuals(model, self.mechanism, mesh_files=MeshFiles(places))

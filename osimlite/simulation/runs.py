@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite.records import dataclass, field
+from osimlite.base.records import dataclass, field
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

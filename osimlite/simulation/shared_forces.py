@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from osimlite.files import make_folder, written_atomically
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.smoothing_spline import derivatives_of_samples
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, field
+from osimlite.base.files import make_folder, written_atomically
+from osimlite.base.records import dataclass, field
+from osimlite.io.tables.control_nodes import control_set
+from osimlite.io.tables.storage import StoTable, write_sto
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
-from osimlite.simulation.files.control_nodes import control_set
-from osimlite.simulation.files.recorded import Recorded, RecordedMotion
-from osimlite.simulation.files.storage import StoTable, write_sto
 from osimlite.simulation.recorded import add_forces, followed, loads_of
+from osimlite.simulation.recorded_motion import Recorded, RecordedMotion
 from osimlite.simulation.static_optimization import TITLE, Shared, StaticOptimization
 
 if TYPE_CHECKING:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from osimlite.base.quantity import Quantity, doubt, quantity
 from osimlite.errors import DocumentError, SettingError, SimulationError
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.quantity import Quantity, doubt, quantity
-from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.io.tables.storage import StoTable, read_sto
+from osimlite.mechanics.multibody.mechanism import Mechanism
 
 if TYPE_CHECKING:
-    from osimlite.multibody.parts import CoordinateInfo
+    from osimlite.mechanics.multibody.parts import CoordinateInfo
     from osimlite.simulation.trajectory import Trajectory
 
 

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
 

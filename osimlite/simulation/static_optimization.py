@@ -15,13 +15,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from osimlite.base.records import dataclass
+from osimlite.base.text import counted, listed, or_known
 from osimlite.errors import ModelError, SettingError, UnsupportedError
-from osimlite.kernels.effort import effort_room
-from osimlite.kernels.layout import CONSTRAINED, MODEL, STAGE
-from osimlite.multibody.constraints import Coupler
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.kernels.effort import effort_room
+from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, STAGE
+from osimlite.mechanics.multibody.constraints import Coupler
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.actuators import (
     ActivationCoordinateActuator,
     Actuator,
@@ -37,10 +39,8 @@ from osimlite.schema.path_actuators import PathActuator
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.simulation.engines.linking import best
-from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.force_labels import label_as_opensim
 from osimlite.simulation.system import System
-from osimlite.text import counted, listed, or_known
 
 if TYPE_CHECKING:
     from osimlite.schema.prescribed import ExternalLoads

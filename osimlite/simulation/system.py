@@ -15,11 +15,19 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from osimlite.errors import SimulationError
-from osimlite.kernels import layout
-from osimlite.kernels.layout import CONTACT_WORK, ITEM, LINK_WORK, MODEL, OUTCOME, STAGE, WORK
-from osimlite.kernels.pointers import Floats
-from osimlite.multibody.dynamics import massless
-from osimlite.multibody.mechanism import GROUND, Mechanism
+from osimlite.mechanics.kernels import layout
+from osimlite.mechanics.kernels.layout import (
+    CONTACT_WORK,
+    ITEM,
+    LINK_WORK,
+    MODEL,
+    OUTCOME,
+    STAGE,
+    WORK,
+)
+from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.multibody.dynamics import massless
+from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.contact import PairContact
 from osimlite.simulation.elements.controls import Controls
@@ -291,7 +299,7 @@ class System:
 
     def _told(self, item: int) -> str:
         """What an item is that has no solution."""
-        from osimlite.kernels.paths import LENGTH
+        from osimlite.mechanics.kernels.paths import LENGTH
         from osimlite.simulation.elements.geometries.path import PATH
         from osimlite.simulation.elements.kind import DeclaredForce
 

@@ -11,17 +11,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite._lazy import shown_in_notebooks
-from osimlite._require import require
-from osimlite.files import make_folder, write_atomically
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
+from osimlite.base.files import make_folder, write_atomically
+from osimlite.base.lazy import shown_in_notebooks
+from osimlite.base.require import require
+from osimlite.base.text import json_lines
+from osimlite.io.tables.storage import StoTable, sto_text
+from osimlite.io.tables.tabular import Tabular
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.snapshot import Snapshot
-from osimlite.simulation.files.storage import StoTable, sto_text
 from osimlite.simulation.force_labels import label_as_opensim
-from osimlite.simulation.tabular import Tabular
-from osimlite.text import json_lines
 
 
 class Trajectory(Tabular):

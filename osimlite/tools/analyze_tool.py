@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array
+from osimlite.base.text import listed
+from osimlite.io.tables.storage import read_sto
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.tools.dynamics import AnalyzeTool
-from osimlite.simulation.files.recorded import RecordedMotion
-from osimlite.simulation.files.storage import read_sto
+from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.start import columns_of_states
 from osimlite.simulation.system import System
-from osimlite.text import listed
 from osimlite.tools.job import Job
 from osimlite.tools.motion import BoolArray, Motion, Record
 from osimlite.tools.outcome import Outcome

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.records import dataclass, field
 from osimlite.errors import SimulationError
-from osimlite.kernels.layout import STAGE
-from osimlite.multibody.functions import Function, PiecewiseConstant
-from osimlite.multibody.smoothing_spline import PiecewisePolynomial
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, field
+from osimlite.mechanics.kernels.layout import STAGE
+from osimlite.mechanics.multibody.functions import Function, PiecewiseConstant
+from osimlite.mechanics.multibody.smoothing_spline import PiecewisePolynomial
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.control_sets import ControlLinear, ControlLinearNode, ControlSet
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements.control_sets import EXCITATION, node_curve

@@ -9,20 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.kernels.constrained_dynamics import SLIGHT, bind
-from osimlite.kernels.layout import LINK_WORK, MODEL
-from osimlite.kernels.parts import link_work
-from osimlite.multibody.body_constraints import carrier
-from osimlite.multibody.constraints import Constraint, Coupler
-from osimlite.multibody.dynamics import mass_matrix
-from osimlite.multibody.kinematics import Kinematics
-from osimlite.multibody.linear import shortest
-from osimlite.multibody.links import Link, Placement, Places, Tree
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.parts import GROUND
-from osimlite.multibody.program import Program
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.kernels.constrained_dynamics import SLIGHT, bind
+from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL
+from osimlite.mechanics.kernels.parts import link_work
+from osimlite.mechanics.multibody.body_constraints import carrier
+from osimlite.mechanics.multibody.constraints import Constraint, Coupler
+from osimlite.mechanics.multibody.dynamics import mass_matrix
+from osimlite.mechanics.multibody.kinematics import Kinematics
+from osimlite.mechanics.multibody.linear import shortest
+from osimlite.mechanics.multibody.links import Link, Placement, Places, Tree
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.parts import GROUND
+from osimlite.mechanics.multibody.program import Program
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema import constraints as schema
 from osimlite.simulation.constrained import constraints_on
 from osimlite.tools.motion import Motion

@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from osimlite.document.part import read_object
+from osimlite.base.records import dataclass, field
 from osimlite.errors import OsimliteError
-from osimlite.multibody.mechanism import GROUND, Mechanism
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, field
+from osimlite.io.document.part import read_object
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.prescribed import ExternalLoads
 from osimlite.simulation.elements.external_loads import loads_table
-from osimlite.simulation.files.storage import StoTable
 
 ON_GROUND = 20.0
 """A foot that is pushed up by more stands, N."""

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.tools.dynamics import ForwardTool
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.run_times import MOST_STEPS
 from osimlite.tools.job import Job
 from osimlite.tools.motion import Motion
 from osimlite.tools.outcome import Outcome
-from osimlite.tools.through_time import StateRows, analyse, analyses_of, simulation_of, tell_rows, told_model
+from osimlite.tools.through_time import (
+    StateRows,
+    analyse,
+    analyses_of,
+    simulation_of,
+    tell_rows,
+    told_model,
+)
 
 
 def run(job: Job, outcome: Outcome) -> None:

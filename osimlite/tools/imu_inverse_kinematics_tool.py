@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
+from osimlite.base.records import replace
+from osimlite.base.text import listed
 from osimlite.fitting.ik_tool import motion_table, told
 from osimlite.fitting.inverse_kinematics import inverse_kinematics
 from osimlite.fitting.orientation_data import OrientationData
-from osimlite.records import replace
+from osimlite.io.tables.storage import StoTable
+from osimlite.io.tables.times import both_of
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.tools.inverse_kinematics import IMUInverseKinematicsTool
-from osimlite.simulation.files.storage import StoTable
-from osimlite.simulation.files.times import both_of
-from osimlite.text import listed
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.job import NONE, Job
 from osimlite.tools.outcome import Outcome

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from osimlite.document.printer import to_text
+from osimlite.base.text import listed
 from osimlite.fitting.orientation_data import OrientationData
 from osimlite.fitting.sensors import place_sensors
+from osimlite.io.document.printer import to_text
 from osimlite.schema.tools.sensors import IMUPlacer
-from osimlite.text import listed
 from osimlite.tools.job import NONE, Job
 from osimlite.tools.outcome import Outcome
 

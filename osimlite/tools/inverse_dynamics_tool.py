@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.mechanism import Mechanism
+from osimlite.base.text import did_you_mean, listed
+from osimlite.io.tables.storage import StoTable
+from osimlite.io.tables.times import both_of
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
 from osimlite.schema.tools.dynamics import InverseDynamicsTool
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.files.recorded import RecordedMotion, exclude_forces
-from osimlite.simulation.files.storage import StoTable
-from osimlite.simulation.files.times import both_of
-from osimlite.text import did_you_mean, listed
+from osimlite.simulation.recorded_motion import RecordedMotion, exclude_forces
 from osimlite.tools.evidence import Evidence, root_of
 from osimlite.tools.job import Job
 from osimlite.tools.joint_loads import loads_at_joints

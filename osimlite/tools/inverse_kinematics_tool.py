@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from osimlite.base.text import listed
 from osimlite.fitting.ik_tool import motion_table, run_inverse_kinematics, told
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.unknown_classes import IGNORED, describe_unknown
+from osimlite.io.tables.old_storage import UNITS
+from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.schema.tools.inverse_kinematics import IKMarkerTask, InverseKinematicsTool
-from osimlite.simulation.files.old_storage import UNITS
-from osimlite.simulation.files.storage import StoTable, read_sto
-from osimlite.text import listed
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.job import NONE, Job
 from osimlite.tools.outcome import Outcome

@@ -6,11 +6,11 @@ import os
 from pathlib import Path
 from typing import Any
 
-from osimlite.document.kept import read_anew
-from osimlite.document.reader import read_document
-from osimlite.document.source import Source
+from osimlite.base.records import dataclass
 from osimlite.errors import DocumentError, UnsupportedError
-from osimlite.records import dataclass
+from osimlite.io.document.kept import read_anew
+from osimlite.io.document.reader import read_document
+from osimlite.io.document.source import Source
 from osimlite.schema.model import Model
 
 NONE = frozenset(("", "Unassigned"))

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.multibody.kinematics import Kinematics
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.parts import GROUND
-from osimlite.multibody.schema_frames import Placements
-from osimlite.multibody.spatial import Array
-from osimlite.records import replace
+from osimlite.base.records import replace
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.multibody.kinematics import Kinematics
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.parts import GROUND
+from osimlite.mechanics.multibody.schema_frames import Placements
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.joints import Joint, ScapulothoracicJoint
 from osimlite.schema.model import Model
-from osimlite.simulation.files.recorded import RecordedMotion
-from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.recorded_motion import RecordedMotion
 
 _SLIGHT = 2.0**-45.5
 """Simbody's SignificantReal: forces of this size are none."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.kernels.layout import LINK_WORK
-from osimlite.multibody.parts import GROUND
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.kernels.layout import LINK_WORK
+from osimlite.mechanics.multibody.parts import GROUND
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.joints import Joint
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls

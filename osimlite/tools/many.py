@@ -13,18 +13,18 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
-from osimlite.document.kept import top_at
+from osimlite.base.files import read_file
+from osimlite.base.records import dataclass, field
+from osimlite.base.text import counted, listed
+from osimlite.base.writing import write_into
 from osimlite.errors import OsimliteError
-from osimlite.files import read_file
-from osimlite.records import dataclass, field
+from osimlite.io.document.kept import top_at
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Set
-from osimlite.text import counted, listed
 from osimlite.tools.named_files import named_files
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.patterns import find_files
 from osimlite.tools.running import run, runnable
-from osimlite.writing import write_into
 
 JOURNAL = ".osimlite-run.jsonl"
 """Where it is noted which setups are done, until all are: in the folder of the results, or where the program runs."""
@@ -350,7 +350,7 @@ class _Work:
 
     def share(self, do: Callable[[Path], Trial], workers: int | None, cluster: str | None) -> None:
         """Run setups side by side. Those that were under way when a process ended are run again, each alone."""
-        from osimlite.sweep.pools import WorkerLostError, processes
+        from osimlite.base.pools import WorkerLostError, processes
 
         alone: list[Path] = []
         while len(self.trials) < len(self.setups):

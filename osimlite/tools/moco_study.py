@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from osimlite.errors import OsimliteError
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome

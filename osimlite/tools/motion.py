@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from osimlite.base.records import dataclass, field, replace
+from osimlite.base.text import counted, did_you_mean
 from osimlite.errors import SettingError
-from osimlite.kernels.layout import STAGE
-from osimlite.multibody.smoothing_spline import derivatives_of_samples
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, field, replace
+from osimlite.io.tables.headers import suffixes
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.kernels.layout import STAGE
+from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.link_motion import LinkMotion
 from osimlite.simulation.paths import Paths
 from osimlite.simulation.probed import Moment
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
-from osimlite.tables import suffixes
-from osimlite.text import counted, did_you_mean
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
 

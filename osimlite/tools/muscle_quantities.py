@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.muscles import (
     DeGrooteFregly2016Muscle,
     MeyerFregly2016Muscle,

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.quantity import tell
+from osimlite.base.records import dataclass, field, replace
+from osimlite.base.text import listed
+from osimlite.base.writing import ResultWriter
 from osimlite.errors import DocumentError, SettingError, SimulationError
+from osimlite.io.tables.old_storage import PRECISION, printed
+from osimlite.io.tables.storage import StoTable, adapter_lines
 from osimlite.lint.diagnostic import Finding
-from osimlite.quantity import tell
-from osimlite.records import dataclass, field, replace
-from osimlite.simulation.files.old_storage import PRECISION, printed
-from osimlite.simulation.files.storage import StoTable, adapter_lines
-from osimlite.text import listed
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.named_files import inputs_among
-from osimlite.writing import ResultWriter
 
 MOST_DIGITS = 1074
 """Behind the point of a number, of which the last is no zero."""

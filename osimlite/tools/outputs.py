@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import UnsupportedError
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.actuators import ScalarActuator
 from osimlite.schema.base import Component
 from osimlite.schema.coordinates import Coordinate

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.spatial import Array
 
 ROUNDING = 2.0 * float(np.finfo(float).eps)
 

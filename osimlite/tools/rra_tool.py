@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.document.printer import to_text
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.smoothing_spline import derivatives_of_samples
+from osimlite.base.text import did_you_mean
+from osimlite.io.document.printer import to_text
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.schema.tools.tracking import RRATool
-from osimlite.text import did_you_mean
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.through_time import sharing_of, simulation_of, told_model

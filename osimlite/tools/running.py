@@ -9,10 +9,12 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
-from osimlite._load import module_name
-from osimlite.document.reader import collector_paused, read_any
+from osimlite.base.files import from_folder
+from osimlite.base.load import module_name
+from osimlite.base.text import counted, listed
+from osimlite.base.writing import ResultWriter
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
-from osimlite.files import from_folder
+from osimlite.io.document.reader import collector_paused, read_any
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Finding, Report, merged
 from osimlite.lint.engine import run as checked
@@ -21,15 +23,13 @@ from osimlite.lint.many import settings_of
 from osimlite.lint.rules.values import KEEPS_DEFAULT
 from osimlite.lint.setup import Setup
 from osimlite.lint.suffixes import is_table
-from osimlite.multibody.extremes import any_numbers
+from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.schema.base import Object
 from osimlite.schema.registry import MODULES
 from osimlite.schema.specs import file_specs
-from osimlite.text import counted, listed
 from osimlite.tools.job import Job, NotRunnable
 from osimlite.tools.named_files import expect_few, read_subject
 from osimlite.tools.outcome import Outcome
-from osimlite.writing import ResultWriter
 
 IGNORED = ("OSIM101",)
 """Errors that OpenSim runs a setup with: properties that it does not know, such as those of other versions."""

@@ -10,22 +10,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from osimlite._load import module_name
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
+from osimlite.base.load import module_name
+from osimlite.base.text import listed
+from osimlite.io.tables.storage import StoTable, read_sto
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Object
 from osimlite.schema.controller_types import CorrectionController, PrescribedController
 from osimlite.schema.model import Model
 from osimlite.schema.specs import file_specs
 from osimlite.schema.tools.dynamics import AbstractTool
-from osimlite.simulation.files.recorded import RecordedMotion
-from osimlite.simulation.files.storage import StoTable, read_sto
 from osimlite.simulation.recorded import add_forces
+from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.start import columns_of_states, starting
 from osimlite.simulation.static_optimization import StaticOptimization
-from osimlite.text import listed
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.job import Job
 from osimlite.tools.motion import Motion, Tables

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.document.printer import to_text
-from osimlite.multibody.spatial import Array
+from osimlite.io.document.printer import to_text
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.control_sets import ControlSet
 from osimlite.schema.model import Model
 from osimlite.schema.tools.analyses import Actuation, Kinematics
 from osimlite.schema.tools.tracking import CMCTool, RRATool
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.run import Simulation
 from osimlite.tools.computed_control import ComputedControl, Control, Followed
 from osimlite.tools.job import Job

@@ -9,18 +9,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.records import dataclass, replace
+from osimlite.base.text import did_you_mean, listed
 from osimlite.errors import SettingError
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.smoothing_spline import SampledCurves, derivatives_of_samples
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, replace
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.smoothing_spline import SampledCurves, derivatives_of_samples
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.tools.tracking import CMC_Joint, CMC_TaskSet, CMCTool, RRATool
-from osimlite.simulation.files.recorded import RecordedMotion
 from osimlite.simulation.lowpass import continued, lowpassed_by_sinc
+from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.static_optimization import least_effort
-from osimlite.text import did_you_mean, listed
 from osimlite.tools.job import Job, NotRunnable
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.through_time import constrained, sharing_of

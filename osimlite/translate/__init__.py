@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from osimlite._lazy import imported_when_used
+from osimlite.base.lazy import imported_when_used
 
 if TYPE_CHECKING:
-    from osimlite.robot.build import build_robot as build_robot
-    from osimlite.robot.robot import Robot as Robot
+    from osimlite.simulation.robot.build import build_robot as build_robot
+    from osimlite.simulation.robot.robot import Robot as Robot
     from osimlite.translate.export import Urdf as Urdf
     from osimlite.translate.export import to_urdf as to_urdf
     from osimlite.translate.fidelity import Fidelity as Fidelity
@@ -20,9 +20,9 @@ __getattr__ = imported_when_used(
     {
         "Fidelity": "osimlite.translate.fidelity",
         "Mjcf": "osimlite.translate.mjcf.export",
-        "Robot": "osimlite.robot.robot",
+        "Robot": "osimlite.simulation.robot.robot",
         "Urdf": "osimlite.translate.export",
-        "build_robot": "osimlite.robot.build",
+        "build_robot": "osimlite.simulation.robot.build",
         "to_mjcf": "osimlite.translate.mjcf.export",
         "to_urdf": "osimlite.translate.export",
     },

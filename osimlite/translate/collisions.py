@@ -5,14 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.errors import ModelError
-from osimlite.meshes.unit_shapes import ball
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array, offset
-from osimlite.robot.mesh_files import MeshFiles
-from osimlite.robot.shapes import Ball, Box, MeshFile, Shape, Visual
-from osimlite.robot.visuals import mesh_shape
-from osimlite.schema.contact import ContactEllipsoid, ContactGeometry, ContactHalfSpace, ContactMesh, ContactSphere
+from osimlite.io.meshes.unit_shapes import ball
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array, offset
+from osimlite.schema.contact import (
+    ContactEllipsoid,
+    ContactGeometry,
+    ContactHalfSpace,
+    ContactMesh,
+    ContactSphere,
+)
 from osimlite.schema.model import Model
+from osimlite.simulation.robot.mesh_files import MeshFiles
+from osimlite.simulation.robot.shapes import Ball, Box, MeshFile, Shape, Visual
+from osimlite.simulation.robot.visuals import mesh_shape
 from osimlite.translate.fidelity import Fidelity
 
 SLAB = (1.0, 200.0, 200.0)

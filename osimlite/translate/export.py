@@ -7,20 +7,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
+from osimlite.base.records import dataclass, field
 from osimlite.errors import OsimliteError
-from osimlite.meshes.folders import MeshFolders
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.extremes import any_numbers
-from osimlite.records import dataclass, field
-from osimlite.robot.build import build_robot
-from osimlite.robot.merge_fixed import merge_fixed
-from osimlite.robot.mesh_files import MeshFiles
-from osimlite.robot.names import legal, legal_names
-from osimlite.robot.range_limits import range_limits
-from osimlite.robot.robot import Robot
-from osimlite.robot.urdf import urdf_text
-from osimlite.robot.visuals import Visuals, collect_visuals
+from osimlite.io.meshes.folders import MeshFolders
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.schema.model import Model
+from osimlite.simulation.robot.build import build_robot
+from osimlite.simulation.robot.merge_fixed import merge_fixed
+from osimlite.simulation.robot.mesh_files import MeshFiles
+from osimlite.simulation.robot.names import legal, legal_names
+from osimlite.simulation.robot.range_limits import range_limits
+from osimlite.simulation.robot.robot import Robot
+from osimlite.simulation.robot.urdf import urdf_text
+from osimlite.simulation.robot.visuals import Visuals, collect_visuals
 from osimlite.translate.collisions import collect_collisions
 from osimlite.translate.fidelity import Fidelity
 from osimlite.translate.files import write_files

@@ -7,9 +7,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, field
-from osimlite.text import json_lines
+from osimlite.base.records import dataclass, field
+from osimlite.base.text import json_lines
+from osimlite.mechanics.multibody.spatial import Array
 
 LEFT_OUT = "left out"
 """What `Record.done` starts with where nothing of the component is in the target."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from osimlite.files import make_folder, write_atomically
+from osimlite.base.files import make_folder, write_atomically
 
 
 def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:

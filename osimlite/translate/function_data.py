@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from osimlite.errors import UnsupportedError
-from osimlite.multibody import functions as f
-from osimlite.multibody.arc import ArcPoint
-from osimlite.multibody.motions import EllipsoidPoint
-from osimlite.multibody.smoothing_spline import PiecewisePolynomial
+from osimlite.mechanics.multibody import functions as f
+from osimlite.mechanics.multibody.arc import ArcPoint
+from osimlite.mechanics.multibody.motions import EllipsoidPoint
+from osimlite.mechanics.multibody.smoothing_spline import PiecewisePolynomial
 
 
 def as_data(function: f.Function) -> dict[str, Any]:

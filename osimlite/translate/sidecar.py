@@ -10,9 +10,9 @@ import json
 import math
 from typing import Any
 
-from osimlite.multibody.functions import IDENTITY
-from osimlite.robot.mimics import couplers, mimics
-from osimlite.robot.robot import Robot
+from osimlite.mechanics.multibody.functions import IDENTITY
+from osimlite.simulation.robot.mimics import couplers, mimics
+from osimlite.simulation.robot.robot import Robot
 from osimlite.translate.function_data import as_data
 
 FORMAT, VERSION = "osimlite-coordinates", 1

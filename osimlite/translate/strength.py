@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
+from osimlite.base.records import replace
 from osimlite.errors import ModelError
-from osimlite.records import replace
-from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.schema.actuators import CoordinateActuator
 from osimlite.schema.model import Model
+from osimlite.simulation.robot.robot import Robot, RobotJoint
 from osimlite.translate.fidelity import Fidelity
 
 

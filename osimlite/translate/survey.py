@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 
-from osimlite.multibody.functions import IDENTITY
-from osimlite.robot.mimics import Mimic, couplers, mimics
-from osimlite.robot.principal_axes import breaks_triangle_rule, principal_axes
-from osimlite.robot.robot import Robot, RobotJoint
+from osimlite.mechanics.multibody.functions import IDENTITY
 from osimlite.schema.base import Component
 from osimlite.schema.constraints import Constraint
 from osimlite.schema.contact import ContactGeometry
@@ -23,6 +20,9 @@ from osimlite.schema.probes import Probe
 from osimlite.schema.sets import ModelComponentSet
 from osimlite.schema.tree import Tree
 from osimlite.schema.wrapping import WrapObject, WrapObjectSet
+from osimlite.simulation.robot.mimics import Mimic, couplers, mimics
+from osimlite.simulation.robot.principal_axes import breaks_triangle_rule, principal_axes
+from osimlite.simulation.robot.robot import Robot, RobotJoint
 from osimlite.translate.fidelity import LEFT_OUT, Fidelity
 
 COMPUTE = "compute its value by the file of coordinates"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from osimlite._lazy import imported_when_used
+from osimlite.base.lazy import imported_when_used
 
 if TYPE_CHECKING:
     from osimlite.view.animation import animate as animate

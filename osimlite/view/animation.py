@@ -9,12 +9,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from osimlite._require import require
+from osimlite.base.files import write_atomically
+from osimlite.base.require import require
 from osimlite.errors import OsimliteError
-from osimlite.files import write_atomically
-from osimlite.meshes.folders import MeshFolders
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.spatial import Array
+from osimlite.io.meshes.folders import MeshFolders
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.view.collect import build_scene

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite.meshes.surface import Indices
-from osimlite.multibody.spatial import Array
+from osimlite.io.meshes.surface import Indices
+from osimlite.mechanics.multibody.spatial import Array
 
 _AT_ONCE = 300_000
 """How many pixels are worked on in one step; more would take more memory and leave the processor's caches."""

@@ -10,16 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.files import NAMED_SO
 from osimlite.errors import ModelError, OsimliteError, UnsupportedError
-from osimlite.files import NAMED_SO
-from osimlite.meshes import unit_shapes
-from osimlite.meshes.folders import MeshFolders
-from osimlite.meshes.read import read_surface
-from osimlite.meshes.surface import Surface
-from osimlite.multibody.extremes import any_numbers
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array, offset, rotation_about, transform
-from osimlite.robot.visuals import frame_of
+from osimlite.io.meshes import unit_shapes
+from osimlite.io.meshes.folders import MeshFolders
+from osimlite.io.meshes.read import read_surface
+from osimlite.io.meshes.surface import Surface
+from osimlite.mechanics.multibody.extremes import any_numbers
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array, offset, rotation_about, transform
 from osimlite.schema import actuators, contact, contact_forces, geometry, springs, wrapping
 from osimlite.schema.base import Component
 from osimlite.schema.forces import Force, HuntCrossleyForce
@@ -33,6 +32,7 @@ from osimlite.schema.tree import Use
 from osimlite.simulation.elements.gather import OPENSIM, ElementBuilder
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.polylines import Course
+from osimlite.simulation.robot.visuals import frame_of
 from osimlite.view.scene import Axes, Color, Item, Layer, Line, LinePoint, Pushed, Scene, sticks
 
 WIDTH_OF_HALF_SPACE = 2.5

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite import __version__
-from osimlite.files import write_atomically
-from osimlite.meshes.unit_shapes import normals_of, tube
-from osimlite.multibody.spatial import Array, quaternion
+from osimlite.base.files import write_atomically
+from osimlite.io.meshes.unit_shapes import normals_of, tube
+from osimlite.mechanics.multibody.spatial import Array, quaternion
 from osimlite.view.motion import Motion, at_times, values_of
 from osimlite.view.picture import FORCE
 from osimlite.view.pushes import LONGEST_ARROW, Pushes

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.lint import Finding, Severity
-from osimlite.multibody import Mechanism, build_mechanism
+from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.document.lexical import formatter
 from osimlite.errors import OsimliteError
+from osimlite.io.document.lexical import formatter
 from osimlite.lint.diagnostic import Finding
-from osimlite.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.fields import Held, Reference

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.codegen.javascript import write_javascript
-from osimlite.kernels.constrained_dynamics import bind
-from osimlite.kernels.dynamics import clear_wrenches, generalized_forces
-from osimlite.kernels.layout import CONSTRAINED, ITEM, LINK_WORK, MODEL
-from osimlite.kernels.motion import move, place
-from osimlite.kernels.paths import pull_path
-from osimlite.kernels.projection import project_speeds
-from osimlite.multibody.constraints import Constraint, Coupler
+from osimlite.mechanics.codegen.javascript import write_javascript
+from osimlite.mechanics.kernels.constrained_dynamics import bind
+from osimlite.mechanics.kernels.dynamics import clear_wrenches, generalized_forces
+from osimlite.mechanics.kernels.layout import CONSTRAINED, ITEM, LINK_WORK, MODEL
+from osimlite.mechanics.kernels.motion import move, place
+from osimlite.mechanics.kernels.paths import pull_path
+from osimlite.mechanics.kernels.projection import project_speeds
+from osimlite.mechanics.multibody.constraints import Constraint, Coupler
 from osimlite.simulation.elements.laws import law_function
 from osimlite.simulation.polylines import Polylines
 

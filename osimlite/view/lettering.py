@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from osimlite._require import require
+from osimlite.base.require import require
 
 
 @contextmanager

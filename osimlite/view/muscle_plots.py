@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.files import make_folder
-from osimlite.multibody.mechanism import Mechanism
+from osimlite.base.files import make_folder
+from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.muscle_curves import QUANTITIES, MuscleCurves
 from osimlite.view.lettering import plain_lettering
 from osimlite.view.plots import figure_of, finish, lines_in, save, shared_out, sheet

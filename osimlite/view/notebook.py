@@ -2,7 +2,7 @@
 
 The page stands in an ``<iframe>`` whose text is all there: it asks no network for anything, has no more rights than to
 run its own program, and so works in the sandboxed frames of VS Code and Colab as well. A class says which of these
-functions shows its objects, see :func:`osimlite._lazy.shown_in_notebooks`.
+functions shows its objects, see :func:`osimlite.base.lazy.shown_in_notebooks`.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from osimlite._require import require
+from osimlite.base.require import require
+from osimlite.base.text import counted, listed, span
 from osimlite.errors import OsimliteError
-from osimlite.text import counted, listed, span
 
 if TYPE_CHECKING:
     from osimlite.lint.diagnostic import Report
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from osimlite.simulation.muscle_curves import MuscleCurves
     from osimlite.simulation.paths import Paths
     from osimlite.simulation.trajectory import Trajectory
-    from osimlite.sweep.optimize import Optimum
-    from osimlite.sweep.run import Outcome
+    from osimlite.studies.sweep.optimize import Optimum
+    from osimlite.studies.sweep.run import Outcome
 
 MOST_ROWS, MOST_COMPONENTS, MOST_BYTES = 200, 3000, 12_000_000
 """What a notebook is burdened with at most: rows of a table, components of a tree, characters of a page."""

@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from osimlite.io.meshes.surface import Surface
+from osimlite.io.meshes.unit_shapes import normals_of
 from osimlite.lint.diagnostic import Finding
-from osimlite.meshes.surface import Surface
-from osimlite.meshes.unit_shapes import normals_of
-from osimlite.multibody.constraints import Coupler, Lock, Prescribed
-from osimlite.multibody.extremes import any_numbers
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.constraints import Coupler, Lock, Prescribed
+from osimlite.mechanics.multibody.extremes import any_numbers
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.translate.sidecar import finite
 from osimlite.view.inspect import component_tree, finding_rows, pins

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from osimlite._require import require
+from osimlite.base.records import dataclass, field
+from osimlite.base.require import require
 from osimlite.errors import OsimliteError
-from osimlite.meshes import unit_shapes
-from osimlite.meshes.surface import Surface
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, field
+from osimlite.io.meshes import unit_shapes
+from osimlite.io.meshes.surface import Surface
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.canvas import Canvas
 from osimlite.view.scene import Bodies, Color, Scene
 

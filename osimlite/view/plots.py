@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from osimlite._require import require
+from osimlite.base.files import make_folder, write_atomically
+from osimlite.base.require import require
 from osimlite.errors import OsimliteError
-from osimlite.files import make_folder, write_atomically
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.lettering import plain_lettering
 from osimlite.view.motion import ContactForce, Motion, contact_forces, in_mechanism_order
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.motion import Motion, at_times, contact_forces
 from osimlite.view.scene import Bodies, Pushed, Scene
 

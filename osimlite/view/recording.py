@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.base.records import dataclass, field
 from osimlite.errors import OsimliteError
-from osimlite.multibody.constraints import Coupler
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, field
+from osimlite.io.tables.storage import StoTable, read_sto
+from osimlite.mechanics.multibody.constraints import Coupler
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.simulation.files.recorded import RecordedMotion
-from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.view.motion import at_times
 
 

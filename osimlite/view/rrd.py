@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from osimlite._require import require
-from osimlite.files import write_atomically
-from osimlite.multibody.spatial import Array
+from osimlite.base.files import write_atomically
+from osimlite.base.require import require
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.motion import Motion, activity, activity_color, values_of
 from osimlite.view.picture import FORCE
 from osimlite.view.pushes import LONGEST_ARROW, Pushes

@@ -12,10 +12,10 @@ from typing import Literal, NamedTuple, cast
 
 import numpy as np
 
-from osimlite.meshes.surface import Surface
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.io.meshes.surface import Surface
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.polylines import Course, Polylines
 
 Color = tuple[float, float, float]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import OsimliteError
-from osimlite.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.mechanism import Mechanism
 
 _log = logging.getLogger(__name__)
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from osimlite.base.files import write_atomically
+from osimlite.base.records import dataclass, replace
 from osimlite.errors import OsimliteError
-from osimlite.files import write_atomically
+from osimlite.io.meshes.folders import MeshFolders
 from osimlite.lint import Config, Finding, validate
-from osimlite.meshes.folders import MeshFolders
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, replace
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.gather import OPENSIM
 from osimlite.view.collect import build_scene

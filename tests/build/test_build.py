@@ -9,7 +9,7 @@ import zipfile
 
 import pytest
 
-from osimlite.codegen.toolchain import find_compiler
+from osimlite.mechanics.codegen.toolchain import find_compiler
 
 pytestmark = pytest.mark.full
 

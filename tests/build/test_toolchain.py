@@ -6,10 +6,10 @@ import sys
 
 import pytest
 
-from osimlite.codegen import toolchain
-from osimlite.codegen.processor import X86_64_V3 as V3_FEATURES
-from osimlite.codegen.processor import _read_cpuinfo
-from osimlite.codegen.toolchain import (
+from osimlite.mechanics.codegen import toolchain
+from osimlite.mechanics.codegen.processor import X86_64_V3 as V3_FEATURES
+from osimlite.mechanics.codegen.processor import _read_cpuinfo
+from osimlite.mechanics.codegen.toolchain import (
     BASELINE,
     NATIVE,
     X86_64_V3,

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from osimlite.choices import choices
+from osimlite.base.choices import choices
 from osimlite.cli import COMMANDS, app
 from osimlite.cli._command import Command
 from osimlite.simulation.options import Options

@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 
 from osimlite import write
 from osimlite.cli.doctor import EXTRAS, NEEDS, Package, doctor, examine, purposes, requirements
-from osimlite.document.data import write_data
 from osimlite.errors import MissingFileError
+from osimlite.io.document.data import write_data
 from osimlite.models.dynamic_walker import dynamic_walker
 
 ROOT = Path(__file__).parents[2]

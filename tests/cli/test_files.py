@@ -138,7 +138,7 @@ def test_errors_are_one_sentence(tmp_path: Path) -> None:
 
 
 def test_build_takes_data(fixtures: Path, tmp_path: Path) -> None:
-    from osimlite.document.data import write_data
+    from osimlite.io.document.data import write_data
 
     model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
     write_data(model, tmp_path / "w.json")

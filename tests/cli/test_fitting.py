@@ -10,8 +10,8 @@ import pytest
 
 import osimlite
 from osimlite.fitting.marker_data import MarkerData
-from osimlite.simulation.files.storage import read_sto
-from osimlite.simulation.files.trc import write_trc
+from osimlite.io.tables.storage import read_sto
+from osimlite.io.tables.trc import write_trc
 from tests.cli.command import run
 
 POINTS = {"one": (0.1, 0.0, 0.0), "two": (0.0, 0.2, 0.0), "three": (0.0, 0.0, 0.3), "four": (0.1, 0.1, 0.1)}

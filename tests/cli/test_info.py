@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from osimlite.document.reader import read
 from osimlite.errors import NotWellFormedError
+from osimlite.io.document.reader import read
 from osimlite.lint import validate
 from tests.cli.command import run
 

@@ -15,8 +15,8 @@ def stopped(*words, **choices):
         raise KeyboardInterrupt
     except KeyboardInterrupt as error:
         {how}
-import osimlite.document.reader
-osimlite.document.reader.read_document = stopped
+import osimlite.io.document.reader
+osimlite.io.document.reader.read_document = stopped
 main(["info", sys.argv[1]])
 """
 

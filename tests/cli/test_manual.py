@@ -46,7 +46,7 @@ def test_whatever_raises_errors_has_a_page():
     folder = Path(errors.__file__).parent
     raises = re.compile(rf"raise ({'|'.join(kind.__name__ for kind in KINDS)})\(")
     parts = {path.relative_to(folder).parts[0] for path in folder.glob("*/**/*.py") if raises.search(path.read_text())}
-    assert "sweep" in parts and not parts - {name.split(".")[1] for name in PAGES}
+    assert "studies" in parts and not parts - {name.split(".")[1] for name in PAGES}
 
 
 @pytest.mark.parametrize(

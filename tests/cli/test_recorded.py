@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.simulation.files.storage import read_sto, write_sto
+from osimlite.io.tables.storage import read_sto, write_sto
 from tests.cli.command import run
 
 pytest.importorskip("numpy", reason="needs numpy (extra 'sim')")

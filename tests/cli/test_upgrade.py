@@ -11,9 +11,9 @@ from typer import Typer
 from typer.testing import CliRunner, Result
 
 from osimlite.cli.upgrade import upgrade
-from osimlite.document.reader import read_document
-from osimlite.document.source import Source
 from osimlite.errors import OsimliteError
+from osimlite.io.document.reader import read_document
+from osimlite.io.document.source import Source
 from osimlite.schema.model import CURRENT_VERSION
 
 

@@ -14,8 +14,8 @@ import pytest
 
 import osimlite
 from osimlite.cli import main
+from osimlite.io.tables.storage import write_sto
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.simulation.files.storage import write_sto
 from tests.view.motions import stroll
 
 

@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from osimlite.document.reader import read_text
+from osimlite.io.document.reader import read_text
 from tests.conftest import CorpusModel
 
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from osimlite.document.reader import read_text
 from osimlite.errors import SimulationError
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.constraints import Lock
+from osimlite.io.document.reader import read_text
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.constraints import Lock
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.engines.protocol import Settings
 

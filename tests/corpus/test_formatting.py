@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.document.formatting import formatted
-from osimlite.document.printer import to_text
-from osimlite.document.reader import read_document
-from osimlite.document.source import Source
 from osimlite.errors import DocumentError
+from osimlite.io.document.formatting import formatted
+from osimlite.io.document.printer import to_text
+from osimlite.io.document.reader import read_document
+from osimlite.io.document.source import Source
 from osimlite.schema.base import Object
 from tests.conftest import CorpusModel
 

@@ -7,11 +7,11 @@ import json
 
 import pytest
 
-from osimlite.document.source import Source
-from osimlite.document.survey import survey
-from osimlite.forces.rotations import transposed
+from osimlite.io.document.source import Source
+from osimlite.io.document.survey import survey
 from osimlite.lint.placement import default_poses
 from osimlite.lint.subject import Subject
+from osimlite.mechanics.laws.rotations import transposed
 from osimlite.schema.constraints import Constraint
 from osimlite.schema.frames import Body
 from tests.conftest import ROUNDED, CorpusModel

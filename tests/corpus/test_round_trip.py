@@ -10,8 +10,8 @@ import re
 
 import pytest
 
-from osimlite.document.printer import to_text
-from osimlite.document.reader import read_text
+from osimlite.io.document.printer import to_text
+from osimlite.io.document.reader import read_text
 from tests.conftest import CorpusModel
 
 COMMENT_LINE = re.compile(r"[ \t]*<!--.*?-->\n", re.DOTALL)

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from osimlite.document.reader import read
+from osimlite.io.document.reader import read
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model

@@ -10,12 +10,12 @@ import json
 
 import pytest
 
-from osimlite.document.printer import to_text
-from osimlite.document.reader import Document, read_document, read_text
-from osimlite.document.source import Source
+from osimlite.io.document.printer import to_text
+from osimlite.io.document.reader import Document, read_document, read_text
+from osimlite.io.document.source import Source
 from osimlite.schema.model import CURRENT_VERSION, Model
 from tests.conftest import CorpusModel
-from tests.document.upgrade.comparison import differences
+from tests.io.document.upgrade.comparison import differences
 
 
 def old(corpus_model: CorpusModel) -> Document:

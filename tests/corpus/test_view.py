@@ -9,8 +9,8 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.meshes.folders import MeshFolders
-from osimlite.multibody import build_mechanism
+from osimlite.io.meshes.folders import MeshFolders
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.view.collect import build_scene
 from osimlite.view.page import page_data
 

@@ -13,7 +13,7 @@ import pytest
 import osimlite
 from osimlite.errors import DocumentError, MissingDependency, OsimliteError, SettingError
 from osimlite.fitting.marker_data import MarkerData, read_trc
-from osimlite.simulation.files.trc import write_trc
+from osimlite.io.tables.trc import write_trc
 
 TRIALS = Path(__file__).parents[2] / "fixtures" / "trials"
 MARKERS = ("one", "two", "three", "four")
@@ -196,7 +196,7 @@ def test_one_marker_at_ten_hertz_is_followed() -> None:
 
 def test_markers_of_a_table(tmp_path: Path) -> None:
     """OpenSim's own table of model markers is taken as data."""
-    from osimlite.simulation.files.storage import write_sto
+    from osimlite.io.tables.storage import write_sto
 
     places = positions(motion(4))
     path = tmp_path / "markers.sto"

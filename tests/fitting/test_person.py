@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.document.reader import read_any
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.fitting.inverse_kinematics import marker_stations
 from osimlite.fitting.person import fit
@@ -18,6 +17,7 @@ from osimlite.fitting.scale_tool import run_scale
 from osimlite.fitting.scaling import scale_model
 from osimlite.fitting.segments import Segments, other_side
 from osimlite.fitting.shape import Shape
+from osimlite.io.document.reader import read_any
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.tools.scale import ScaleTool
 from tests.fitting.test_scaling import assert_same

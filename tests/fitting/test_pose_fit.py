@@ -16,14 +16,14 @@ from osimlite import Body, FreeJoint, Model, PhysicalOffsetFrame, PinJoint
 from osimlite.errors import SimulationError
 from osimlite.fitting.pose_fit import PoseFit
 from osimlite.fitting.pose_layout import Goal, Marker, Sensor
-from osimlite.kernels import pose_cost, pose_record
-from osimlite.kernels.pose_fit import weigh
-from osimlite.multibody import functions as f
-from osimlite.multibody.constraints import Coupler
-from osimlite.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
-from osimlite.multibody.spatial import rotation_xyz, transform
+from osimlite.mechanics.kernels import pose_cost, pose_record
+from osimlite.mechanics.kernels.pose_fit import weigh
+from osimlite.mechanics.multibody import functions as f
+from osimlite.mechanics.multibody.constraints import Coupler
+from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
+from osimlite.mechanics.multibody.spatial import rotation_xyz, transform
 from osimlite.simulation.engines.linking import COMPILED, PYTHON
-from tests.multibody.strategies import Case, cases, constraint_of
+from tests.mechanics.multibody.strategies import Case, cases, constraint_of
 
 ROUND = "ConstantCurvatureJoint"
 """Its functions of several coordinates are bent, which Newton's matrix leaves out."""

@@ -15,10 +15,10 @@ from osimlite.errors import ModelError, SettingError
 from osimlite.fitting.measuring import frames_between
 from osimlite.fitting.scale_tool import run_scale
 from osimlite.fitting.scaling import scale_model, scales
+from osimlite.io.tables.storage import read_sto
 from osimlite.schema.base import Object
 from osimlite.schema.facts import HOLDER, OWN, PATH
 from osimlite.schema.registry import MODULES
-from osimlite.simulation.files.storage import read_sto
 
 CASE = "oracle/tools/reference/scale_gait2354"
 

@@ -13,9 +13,14 @@ import osimlite
 from osimlite.errors import DocumentError, OsimliteError, SettingError
 from osimlite.fitting.orientation_data import OrientationData
 from osimlite.fitting.sensors import place_sensors
-from osimlite.multibody.spatial import quaternion, rotation_about_space, rotation_of, rotation_xyz
-from osimlite.simulation.files.storage import read_sto, write_sto
-from osimlite.simulation.files.trc import write_trc
+from osimlite.io.tables.storage import read_sto, write_sto
+from osimlite.io.tables.trc import write_trc
+from osimlite.mechanics.multibody.spatial import (
+    quaternion,
+    rotation_about_space,
+    rotation_of,
+    rotation_xyz,
+)
 from tests.cli.command import run
 
 PLACER = """<OpenSimDocument Version="40600">

@@ -298,7 +298,7 @@ def _sources(kind: Kind) -> list[bytes]:
 
 def _made(name: str) -> bytes:
     """Return the content of a file that is not among the fixtures."""
-    from osimlite.document.data import to_yaml
+    from osimlite.io.document.data import to_yaml
     from osimlite.models.walking import human
 
     walking = ROOT / "osimlite" / "models" / "walking"

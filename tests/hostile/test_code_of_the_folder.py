@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from osimlite._require import SAFE_PATH, leave_current_folder, protect_processes, require
+from osimlite.base.require import SAFE_PATH, leave_current_folder, protect_processes, require
 
 ROOT = Path(osimlite.__file__).parents[1]
 MODULES = ("ctypes", "numpy", "json", "textwrap", "subprocess", "yaml", "lxml", "casadi", "random", "signal")

@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.document.source import Source
-from osimlite.document.spans import blank_remarks
 from osimlite.errors import DocumentError, OsimliteError, SimulationError
+from osimlite.io.document.source import Source
+from osimlite.io.document.spans import blank_remarks
+from osimlite.io.meshes.surface import triangulated
+from osimlite.io.meshes.vtp import read_vtp
+from osimlite.io.tables.storage import StoTable, adapter_lines, sto_text, write_sto
 from osimlite.lint.engine import check_source
-from osimlite.meshes.surface import triangulated
-from osimlite.meshes.vtp import read_vtp
-from osimlite.reflexes.parameters import read_par
-from osimlite.reflexes.settings import read_settings
-from osimlite.simulation.files.storage import StoTable, adapter_lines, sto_text, write_sto
+from osimlite.studies.reflexes.parameters import read_par
+from osimlite.studies.reflexes.settings import read_settings
 from tests.cli.command import run
 
 pipes = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pipes among its files")
@@ -132,7 +132,7 @@ def test_counts_of_scenarios(tmp_path: Path, key: str, value: str) -> None:
 @pytest.mark.parametrize("damage", range(12))
 def test_damaged_c3d_files_end_no_process(tmp_path: Path, fixtures: Path, damage: int) -> None:
     pytest.importorskip("ezc3d", reason="needs ezc3d (extra 'c3d')")
-    from osimlite.simulation.files.c3d import read_c3d_forces, read_c3d_markers
+    from osimlite.io.tables.c3d import read_c3d_forces, read_c3d_markers
 
     data = bytearray((fixtures / "trials" / "force_plate.c3d").read_bytes())
     rng = np.random.default_rng(damage)
@@ -222,7 +222,7 @@ def test_whole_numbers_of_any_length(tmp_path: Path, number: str) -> None:
     for name, text in (("m.yaml", f"gravity: [0, {number}, 0]\n"), ("m.json", f'{{"gravity": [0, {number}, 0]}}')):
         (tmp_path / name).write_text(text)
         with pytest.raises(OsimliteError):
-            osimlite.document.data.read_data(tmp_path / name)
+            osimlite.io.document.data.read_data(tmp_path / name)
 
 
 BROKEN_SETTINGS = [
@@ -263,7 +263,7 @@ CLASSES = [
 
 @pytest.mark.parametrize("text", CLASSES, ids=range(len(CLASSES)))
 def test_classes_that_make_no_sense(tmp_path: Path, text: str) -> None:
-    from osimlite.document.plugins import classes_in
+    from osimlite.io.document.plugins import classes_in
 
     (tmp_path / "c.json").write_text(text)
     with pytest.raises(OsimliteError):
@@ -275,7 +275,7 @@ def test_classes_that_make_no_sense(tmp_path: Path, text: str) -> None:
 
 @pytest.mark.parametrize("name", ["a\tb", "a\nb", "a\nendheader\nb", "a\r", "a\u2028b", "a\x0b"])
 def test_names_do_not_break_tables(tmp_path: Path, name: str) -> None:
-    from osimlite.simulation.files.old_storage import printed
+    from osimlite.io.tables.old_storage import printed
 
     times, rows = np.zeros(1), np.zeros((1, 1))
     for make in (
@@ -299,8 +299,8 @@ def test_no_table_has_nan_as_a_result(tmp_path: Path, value: float) -> None:
 
 
 def test_tables_of_tools_say_where_they_have_nan(tmp_path: Path) -> None:
+    from osimlite.base.writing import ResultWriter
     from osimlite.tools.outcome import Outcome
-    from osimlite.writing import ResultWriter
 
     outcome = Outcome()
     table = StoTable("Forces", np.zeros(1), ("a", "b"), np.array([[np.nan, 1.0]]))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.lint import validate
 from tests.cli.command import run
 from tests.lint.verdict_cases import small_model

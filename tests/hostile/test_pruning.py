@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.pruning import DAY_S, MARKER, UNUSED_DAYS, is_due, mark_used, prune_cache
-from osimlite.writing import write_cached
+from osimlite.base.pruning import DAY_S, MARKER, UNUSED_DAYS, is_due, mark_used, prune_cache
+from osimlite.base.writing import write_cached
 
 OLD_S = (UNUSED_DAYS + 1.0) * DAY_S
 needs_links = pytest.mark.skipif(sys.platform == "win32", reason="Windows users may make no links")
@@ -64,7 +64,7 @@ def test_links_are_neither_followed_nor_removed(tmp_path: Path):
 
 @needs_links
 def test_a_folder_that_becomes_a_link_meanwhile_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    from osimlite import pruning
+    from osimlite.base import pruning
 
     cache, home = tmp_path / "cache", tmp_path / "home"
     make_entry(cache, "09/a.json", OLD_S)

@@ -1,4 +1,4 @@
-"""Every file that a user or a document names is opened by `osimlite.reading`."""
+"""Every file that a user or a document names is opened by `osimlite.base.reading`."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_no_other_module_opens_files():
         for path in sorted(PACKAGE.rglob("*.py"))
     }
     wrong = [f"{name}:{line}: {call}" for name, calls in reads.items() if name not in ALLOWED for line, call in calls]
-    assert not wrong, "open these by osimlite.reading or osimlite.files:\n" + "\n".join(wrong)
+    assert not wrong, "open these by osimlite.base.reading or osimlite.base.files:\n" + "\n".join(wrong)
     assert not [name for name in ALLOWED if not reads.get(name)], "a module opens nothing any more"
 
 

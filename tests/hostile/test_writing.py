@@ -11,8 +11,7 @@ from zlib import crc32
 import pytest
 
 from osimlite import __version__
-from osimlite.errors import OsimliteError
-from osimlite.writing import (
+from osimlite.base.writing import (
     ResultWriter,
     WriteRefusedError,
     kind_of,
@@ -20,6 +19,7 @@ from osimlite.writing import (
     write_atomically,
     write_into,
 )
+from osimlite.errors import OsimliteError
 from tests.cli.command import Done, run
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows users may make no links")

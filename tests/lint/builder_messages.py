@@ -9,19 +9,19 @@ from typing import NamedTuple
 
 PACKAGE = Path(__file__).resolve().parents[2] / "osimlite"
 PARTS = (
-    "multibody/assembly.py",
-    "multibody/build.py",
-    "multibody/constraint_records.py",
-    "multibody/dynamics.py",
-    "multibody/formula.py",
-    "multibody/function_tables.py",
-    "multibody/functions.py",
-    "multibody/joints.py",
-    "multibody/motions.py",
-    "multibody/schema_constraints.py",
-    "multibody/schema_frames.py",
-    "multibody/schema_functions.py",
-    "multibody/schema_joints.py",
+    "mechanics/multibody/assembly.py",
+    "mechanics/multibody/build.py",
+    "mechanics/multibody/constraint_records.py",
+    "mechanics/multibody/dynamics.py",
+    "mechanics/multibody/formula.py",
+    "mechanics/multibody/function_tables.py",
+    "mechanics/multibody/functions.py",
+    "mechanics/multibody/joints.py",
+    "mechanics/multibody/motions.py",
+    "mechanics/multibody/schema_constraints.py",
+    "mechanics/multibody/schema_frames.py",
+    "mechanics/multibody/schema_functions.py",
+    "mechanics/multibody/schema_joints.py",
     "simulation/elements",
 )
 """Modules that build what a model describes."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.lint.rules.classes import set_for
 from osimlite.schema.registry import class_for
 

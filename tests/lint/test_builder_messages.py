@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.document.reader import read_text
-from osimlite.document.source import Source
 from osimlite.errors import ModelError, OsimliteError, UnsupportedError
+from osimlite.io.document.reader import read_text
+from osimlite.io.document.source import Source
 from osimlite.lint import construction as remembering
 from osimlite.lint import validate
-from osimlite.measuring import construction
+from osimlite.lint.measuring import construction
 from osimlite.simulation.elements.gather import ElementBuilder
 from tests.lint.builder_messages import Message, read_messages
 from tests.lint.verdict_cases import CASES, path_of, small_model
@@ -122,18 +122,18 @@ WITHOUT_MODEL = {
     "simulation/elements/contact.py": "frames that are none of a body, and an option",
     "simulation/elements/gather.py": "the sum of all that is left out",
     "simulation/elements/kind.py": "an option of static optimization",
-    "multibody/assembly.py": "speeds that a call sets",
-    "multibody/build.py": "frames that are none of a body, loops",
-    "multibody/constraint_records.py": "a class that nobody has",
-    "multibody/dynamics.py": "what a call sets; the default pose is evaluated by the kernels",
-    "multibody/function_tables.py": "a class that nobody has",
-    "multibody/functions.py": "reported by OSIM604 before",
-    "multibody/joints.py": "axes that a call makes",
-    "multibody/motions.py": "poses that a call sets",
-    "multibody/schema_constraints.py": "coordinates that stand several times in a joint",
-    "multibody/schema_frames.py": "unknown classes of frames",
-    "multibody/schema_functions.py": "the reader keeps the default of an empty list",
-    "multibody/schema_joints.py": "reported by OSIM206 before",
+    "mechanics/multibody/assembly.py": "speeds that a call sets",
+    "mechanics/multibody/build.py": "frames that are none of a body, loops",
+    "mechanics/multibody/constraint_records.py": "a class that nobody has",
+    "mechanics/multibody/dynamics.py": "what a call sets; the default pose is evaluated by the kernels",
+    "mechanics/multibody/function_tables.py": "a class that nobody has",
+    "mechanics/multibody/functions.py": "reported by OSIM604 before",
+    "mechanics/multibody/joints.py": "axes that a call makes",
+    "mechanics/multibody/motions.py": "poses that a call sets",
+    "mechanics/multibody/schema_constraints.py": "coordinates that stand several times in a joint",
+    "mechanics/multibody/schema_frames.py": "unknown classes of frames",
+    "mechanics/multibody/schema_functions.py": "the reader keeps the default of an empty list",
+    "mechanics/multibody/schema_joints.py": "reported by OSIM206 before",
 }
 """Modules of which some messages need more than a small model, and what that is."""
 

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.lint import validate
 
 

@@ -18,10 +18,10 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.document.printer import to_text
-from osimlite.document.reader import read_document
-from osimlite.document.source import Source
 from osimlite.errors import OsimliteError
+from osimlite.io.document.printer import to_text
+from osimlite.io.document.reader import read_document
+from osimlite.io.document.source import Source
 from osimlite.lint.engine import check_source, run, subject_of
 from osimlite.lint.reporters import render
 from osimlite.lint.suffixes import is_table

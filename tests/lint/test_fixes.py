@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.document.source import Source
 from osimlite.errors import OsimliteError
+from osimlite.io.document.source import Source
 from osimlite.lint import validate
 from osimlite.lint.fixes import mended
 

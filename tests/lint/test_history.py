@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.document.source import Source
 from osimlite.errors import OsimliteError
+from osimlite.io.document.source import Source
 from osimlite.lint import Config, validate
 from osimlite.lint.engine import check_source
 from osimlite.lint.history import NEWEST, later_than

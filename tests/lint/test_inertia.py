@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.lint import validate
 from osimlite.lint.fixes import mended
 from osimlite.lint.inertia import possible_inertia, principal_axes

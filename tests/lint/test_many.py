@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
+from osimlite.base.writing import user_cache_folder
 from osimlite.errors import MissingFileError
 from osimlite.lint import Config, validate
 from osimlite.lint import many as module
 from osimlite.lint.cache import digest_of_code
 from osimlite.lint.many import Texts, check_files, settings_of
 from osimlite.lint.ours import is_ours
-from osimlite.writing import user_cache_folder
 
 MESH = """\
 <OpenSimDocument Version="40600">

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.lint import Config, measures, parts, validate
 from osimlite.lint.many import check_files
-from osimlite.multibody.parts import CoordinateInfo
+from osimlite.mechanics.multibody.parts import CoordinateInfo
 from tests.bare import BareEnvironment
 from tests.cli.command import run
 
@@ -119,8 +119,8 @@ def test_a_path_is_reported_once_with_its_greatest_jump(fixtures):
 
 def test_the_language_server_does_not_measure(jumping):
     pytest.importorskip("pygls")
-    from osimlite.lsp.analysis import Analysis
-    from osimlite.lsp.text import Text
+    from osimlite.cli.language_server.analysis import Analysis
+    from osimlite.cli.language_server.text import Text
 
     report = Analysis(Text(jumping.read_text()), str(jumping)).report
     assert not report.findings and not report.unmeasured
@@ -136,7 +136,7 @@ def test_a_value_is_told_in_the_unit_of_what_the_coordinate_moves(motion, said):
 
 def test_without_machine_code_many_surfaces_are_not_measured(jumping, monkeypatch):
     """The report says so, and is not kept: the next check may have some."""
-    from osimlite.measuring import model
+    from osimlite.lint.measuring import model
 
     monkeypatch.setattr(measures, "FEW", -1)
     parts.remembered.clear()

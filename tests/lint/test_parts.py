@@ -7,8 +7,8 @@ import re
 
 import pytest
 
-import osimlite.measuring
-from osimlite.document.source import Source
+import osimlite.lint.measuring
+from osimlite.io.document.source import Source
 from osimlite.lint import Config, measures, parts, validate
 from osimlite.lint.many import check_files
 from osimlite.lint.subject import Subject
@@ -30,14 +30,14 @@ OWNER = re.compile(
 def asked(monkeypatch):
     """The paths that are measured, each time that something is."""
     results: list[list[str]] = []
-    own = osimlite.measuring.measured
+    own = osimlite.lint.measuring.measured
 
     def measured(model, **given):
         result = own(model, **given)
         results.append(sorted(set(result.swept) - set(given["known"][1].swept if given["known"] else ())))
         return result
 
-    monkeypatch.setattr(osimlite.measuring, "measured", measured)
+    monkeypatch.setattr(osimlite.lint.measuring, "measured", measured)
     parts.remembered.clear()
     return results
 
@@ -111,7 +111,7 @@ def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch, 
     path.write_text(text)
     result = check_files([str(path)], Config()).codes
     (kept,) = findings_cache.glob("*/measured/*.json")
-    subject = Subject(osimlite.document.survey.survey(Source(text.encode())))
+    subject = Subject(osimlite.io.document.survey.survey(Source(text.encode())))
     own = parts.parts_of(subject)
     parts.remembered.clear()
     known = parts.recall(own, kept.parents[1])
@@ -126,12 +126,12 @@ def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch, 
 
 def measures_of(text):
     parts.remembered.clear()
-    subject = Subject(osimlite.document.survey.survey(Source(text.encode())))
+    subject = Subject(osimlite.io.document.survey.survey(Source(text.encode())))
     assert not subject.unmeasured()
     return measures.measures_of(subject)
 
 
 def test_a_model_whose_classes_stand_elsewhere_has_no_parts(fixtures):
     text = (fixtures / "lint" / "OSIM632" / "fail-02-two-coordinates.osim").read_text()
-    subject = Subject(osimlite.document.survey.survey(Source(text.encode())), Config(classes=("x.toml",)))
+    subject = Subject(osimlite.io.document.survey.survey(Source(text.encode())), Config(classes=("x.toml",)))
     assert parts.parts_of(subject) is None

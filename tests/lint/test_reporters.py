@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from osimlite.document.source import Source
 from osimlite.errors import OsimliteError
+from osimlite.io.document.source import Source
 from osimlite.lint import Report, validate
 from osimlite.lint.diagnostic import Finding, Severity
 from osimlite.lint.reporters import FORMATS, render

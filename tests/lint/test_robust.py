@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.lint import validate
 from osimlite.lint.reporters import render
 from osimlite.schema.fields import Held

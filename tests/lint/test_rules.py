@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.lint import Config, Severity, validate
 from osimlite.lint.baseline import without_baseline, write_baseline
 from osimlite.lint.engine import APART, FAMILIES, Rule, all_rules, groups

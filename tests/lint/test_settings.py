@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from osimlite.document.source import Source
 from osimlite.errors import OsimliteError
+from osimlite.io.document.source import Source
 from osimlite.lint import Config, Severity, validate
 from osimlite.lint.baseline import without_baseline, write_baseline
 from osimlite.lint.cache import key_of

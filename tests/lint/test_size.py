@@ -6,9 +6,9 @@ import sys
 
 import pytest
 
-from osimlite.document.source import Source
+from osimlite.base.text import LONGEST
+from osimlite.io.document.source import Source
 from osimlite.lint.engine import check_source
-from osimlite.text import LONGEST
 from tests.suite import choose
 
 BODY = "<Body name='{}' {}><mass>1</mass>{}</Body>"

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.lint.engine import run, subject_in
 from osimlite.lint.fixes import edits_of, mended
 

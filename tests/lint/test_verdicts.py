@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.lint import Report, validate
 from osimlite.lint.many import check_files
 from tests.bare import BareEnvironment

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.lint import validate
 from osimlite.lint.axes import axes_refused
 from osimlite.schema.coordinates import Coordinate

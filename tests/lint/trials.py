@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from osimlite.document.source import Position
+from osimlite.io.document.source import Position
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report
 from osimlite.lint.engine import Rule, run

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from osimlite.document.printer import to_text
-from osimlite.document.reader import read_text
+from osimlite.io.document.printer import to_text
+from osimlite.io.document.reader import read_text
 from osimlite.models.dynamic_walker import dynamic_walker
 
 

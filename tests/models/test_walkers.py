@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from osimlite.document.printer import to_text
-from osimlite.document.reader import read
+from osimlite.io.document.printer import to_text
+from osimlite.io.document.reader import read
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.models.source import make_model
 from osimlite.models.walkers import FURTHEST_START, furthest_walker
@@ -34,7 +34,7 @@ def test_the_furthest_walker_is_the_exercise_but_for_its_start():
 
 @pytest.mark.parametrize("accuracy", [1e-5, 1e-6, 1e-9])
 def test_the_furthest_walker_makes_four_steps(accuracy):
-    from osimlite.gait.steps import along_slope, walk_many
+    from osimlite.studies.gait.steps import along_slope, walk_many
 
     with Simulation(furthest_walker(), "compiled") as simulation:
         engine = simulation.engine

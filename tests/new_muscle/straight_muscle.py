@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated
 
-from osimlite.forces.muscles import MuscleInputs
+from osimlite.mechanics.laws.muscles import MuscleInputs
 from osimlite.schema.facts import NAN, Contradiction, Facts
 from osimlite.schema.fields import real
 from osimlite.schema.muscles import Muscle

@@ -9,7 +9,7 @@ import pytest
 
 import osimlite
 from osimlite import optimal
-from osimlite._load import module_name
+from osimlite.base.load import module_name
 from osimlite.moco import problem_of, problem_of_inverse, problem_of_track
 from osimlite.optimal.hessian import Hessian
 from osimlite.optimal.problem import Problem

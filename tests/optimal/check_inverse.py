@@ -7,9 +7,9 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
+from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.moco import MocoTrajectory, evaluated, inverse, problem_of_inverse, solve
 from osimlite.optimal.program import Program
-from osimlite.simulation.files.storage import read_sto, write_sto
 from tests.optimal.studies import moco_found, moco_said, study, study_file
 
 NAME = "squat_inverse-20"

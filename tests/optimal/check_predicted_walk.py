@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.base.records import replace
 from osimlite.cli import main
 from osimlite.optimal.simulated import simulated
-from osimlite.records import replace
 from osimlite.tools import moco_study
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome
+from osimlite.tools.report import collect_contacts, collect_controls, collect_trials
 from osimlite.view.motion import contact_forces
 from osimlite.view.recording import read_recording
-from osimlite.view.report import collect_contacts, collect_controls, collect_trials
 
 WEIGHT = 75.0 * 9.80665
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.moco import MocoTrajectory, evaluated, problem_of, solve
 from osimlite.optimal.program import Program
-from osimlite.simulation.files.storage import read_sto, write_sto
 from tests.optimal import small
 from tests.optimal.studies import moco_found, moco_said, study, study_file
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.io.tables.storage import read_sto
 from osimlite.moco import MocoTrajectory, evaluated, problem_of_track
 from osimlite.optimal.program import Program
-from osimlite.simulation.files.storage import read_sto
 from tests.conftest import ROOT
 from tests.optimal.studies import moco_found, moco_said, study
 

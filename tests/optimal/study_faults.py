@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import osimlite
-from osimlite.simulation.files.storage import write_sto
+from osimlite.io.tables.storage import write_sto
 from tests.lint.project_faults import KINDS as GENERAL
 from tests.lint.projects import Change, Project, misspelt
 from tests.optimal.small import BODIES, TIMES, coupled, links, study_of, tables

@@ -7,7 +7,7 @@ import pytest
 
 import osimlite
 from osimlite import Body, Model
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.frames import PhysicalOffsetFrame
 from osimlite.schema.functions import Constant, Sine

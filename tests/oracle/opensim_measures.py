@@ -17,10 +17,10 @@ import opensim
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.lint.measures import Measures, Pose
-from osimlite.measuring import measured
-from osimlite.measuring.jumps import ASIDE
-from osimlite.measuring.muscles import REST
-from osimlite.measuring.sweeps import tied
+from osimlite.lint.measuring import measured
+from osimlite.lint.measuring.jumps import ASIDE
+from osimlite.lint.measuring.muscles import REST
+from osimlite.lint.measuring.sweeps import tied
 from tests.oracle.opensim_runs import put
 
 BEYOND = 0.05

@@ -8,7 +8,7 @@ import numpy as np
 import opensim
 
 import osimlite
-from osimlite.multibody.constraints import Lock
+from osimlite.mechanics.multibody.constraints import Lock
 from tests.oracle.opensim_runs import put
 
 JUMP = 1e-11

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.io.tables.storage import StoTable, read_sto
 
 
 def put(coordinates: Iterable[Any], state: Any, q: Iterable[float], u: Iterable[float]) -> None:

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.schema.registry import tags
 
 VERSIONS: tuple[int, ...] = (

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.functions import SimmSpline
 from osimlite.schema.registry import class_for
 from osimlite.simulation import read_sto

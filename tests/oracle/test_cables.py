@@ -9,7 +9,7 @@ import pytest
 
 import osimlite
 from osimlite import Body, ContactSphere, Coordinate, Model
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactTorus
 from osimlite.schema.frames import PhysicalOffsetFrame
 from osimlite.schema.path_forces import PathSpring

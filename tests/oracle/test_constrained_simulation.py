@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.document.reader import read_text
+from osimlite.io.document.reader import read_text
 from osimlite.schema.forces import Force
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.path_forces import PathSpring

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.multibody import Mechanism, build_mechanism
-from osimlite.multibody.mechanism import MassProperties
+from osimlite.mechanics.multibody import Mechanism, build_mechanism
+from osimlite.mechanics.multibody.mechanism import MassProperties
 from tests.oracle.opensim_runs import put
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

@@ -9,10 +9,22 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite import Body, ContactHalfSpace, ContactMesh, ContactSphere, Coordinate, HuntCrossleyForce, Model
+from osimlite import (
+    Body,
+    ContactHalfSpace,
+    ContactMesh,
+    ContactSphere,
+    Coordinate,
+    HuntCrossleyForce,
+    Model,
+)
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.contact_forces import ElasticFoundationForce
-from osimlite.schema.springs import ExpressionBasedPointToPointForce, PointToPointSpring, SpringGeneralizedForce
+from osimlite.schema.springs import (
+    ExpressionBasedPointToPointForce,
+    PointToPointSpring,
+    SpringGeneralizedForce,
+)
 from osimlite.simulation import read_sto
 from tests.oracle.opensim_runs import simulated
 from tests.simulation.meshes import ball, block, write_obj, write_vtp

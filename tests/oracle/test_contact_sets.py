@@ -8,12 +8,12 @@ from math import inf
 import numpy as np
 import pytest
 
-from osimlite.forces.hunt_crossley import (
+from osimlite.mechanics.laws.hunt_crossley import (
     combine_materials,
     half_space_sphere,
     sphere_sphere,
 )
-from tests.forces.contact_sets import contact_forces, simbody_pair_order
+from tests.mechanics.laws.contact_sets import contact_forces, simbody_pair_order
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

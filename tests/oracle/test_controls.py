@@ -7,7 +7,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import ModelError
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
 from osimlite.schema.controller_types import (
     ControlSetController,
@@ -22,8 +22,8 @@ from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation import write_sto
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.system import System
-from osimlite.sweep.plan import plan
-from osimlite.sweep.variants import Variants
+from osimlite.studies.sweep.plan import plan
+from osimlite.studies.sweep.variants import Variants
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

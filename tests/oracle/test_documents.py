@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from osimlite.document.reader import read_document
-from osimlite.document.source import Source
+from osimlite.io.document.reader import read_document
+from osimlite.io.document.source import Source
 from osimlite.schema.base import Object
 from tests.conftest import ROOT
 from tests.oracle.test_schema import COMMENT_LINE

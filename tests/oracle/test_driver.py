@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 import osimlite
-import osimlite.mjcf
 
 opensim = pytest.importorskip("opensim")
 

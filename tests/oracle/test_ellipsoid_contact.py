@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from osimlite import ContactHalfSpace, ContactSphere, HuntCrossleyForce
-from osimlite.forces.ellipsoid_contact import ellipsoid_ellipsoid
-from osimlite.forces.hunt_crossley import combine_materials, contact_force
-from osimlite.forces.vectors import ZERO
-from osimlite.multibody.spatial import rotation_xyz
+from osimlite.mechanics.laws.ellipsoid_contact import ellipsoid_ellipsoid
+from osimlite.mechanics.laws.hunt_crossley import combine_materials, contact_force
+from osimlite.mechanics.laws.vectors import ZERO
+from osimlite.mechanics.multibody.spatial import rotation_xyz
 from osimlite.schema.contact import ContactEllipsoid
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

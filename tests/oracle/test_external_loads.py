@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.document.reader import read_text
-from osimlite.multibody import build_mechanism
+from osimlite.io.document.reader import read_text
+from osimlite.io.tables.storage import write_sto
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.prescribed import ExternalForce, ExternalLoads
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.files.recorded import RecordedMotion, exclude_forces
-from osimlite.simulation.files.storage import write_sto
+from osimlite.simulation.recorded_motion import RecordedMotion, exclude_forces
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")

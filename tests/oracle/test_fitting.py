@@ -19,8 +19,8 @@ from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.person_files import SETUP, UNSCALED, person_texts
 from osimlite.fitting.pose_layout import Marker
 from osimlite.fitting.scaling import scale_model
-from osimlite.simulation.files.storage import read_sto
-from osimlite.simulation.files.trc import write_trc
+from osimlite.io.tables.storage import read_sto
+from osimlite.io.tables.trc import write_trc
 from tests.fitting.test_person import HELD, marked, person
 from tests.fitting.test_pose_fit import cost_of
 from tests.fitting.test_scaling import assert_same

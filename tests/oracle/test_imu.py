@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.multibody.spatial import quaternion, rotation_of, rotation_xyz
-from osimlite.simulation.files.storage import write_sto
-from osimlite.simulation.files.trc import write_trc
+from osimlite.io.tables.storage import write_sto
+from osimlite.io.tables.trc import write_trc
+from osimlite.mechanics.multibody.spatial import quaternion, rotation_of, rotation_xyz
 from tests.fitting.test_scaling import assert_same
 from tests.oracle.test_fitting import ask, model_with
 

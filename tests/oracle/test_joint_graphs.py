@@ -19,7 +19,7 @@ import pytest
 import osimlite
 from osimlite.errors import UnsupportedError
 from osimlite.lint import validate
-from osimlite.multibody.build import build_mechanism
+from osimlite.mechanics.multibody.build import build_mechanism
 from tests.oracle.test_lint_structural_edits import claims_refusal
 from tests.suite import choose
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.models.jumper import jumper
 from osimlite.schema.actuators import ScalarActuator
 from osimlite.schema.constraint_types import RollingOnSurfaceConstraint
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
-from osimlite.simulation.files.storage import read_sto, write_sto
 from tests.oracle.test_run_tools import both, compare, real
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

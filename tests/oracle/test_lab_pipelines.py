@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.simulation.files.storage import read_sto, write_sto
+from osimlite.io.tables.storage import read_sto, write_sto
 from tests.labs import change, copy_lab, difference, run_opensim
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import pytest
 
-from osimlite.document.source import Source
-from osimlite.document.survey import survey
+from osimlite.io.document.source import Source
+from osimlite.io.document.survey import survey
 from osimlite.lint import validate
 from osimlite.lint.subject import Subject
 from tests.conftest import CorpusModel

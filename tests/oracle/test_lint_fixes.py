@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.lint import validate
 from osimlite.lint.fixes import mended
 from tests.oracle.test_lint_corpus_references import victim

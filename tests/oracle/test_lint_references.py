@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.lint import validate
 
 pytestmark = pytest.mark.oracle

@@ -11,7 +11,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import SimulationError
-from osimlite.multibody import Mechanism, build_mechanism
+from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.functions import Constant, LinearFunction
 from osimlite.schema.joints import ConstantCurvatureJoint

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from osimlite.document.reader import read_text
 from osimlite.errors import SimulationError
-from osimlite.multibody import Mechanism, build_mechanism
-from osimlite.multibody.constraints import Lock
+from osimlite.io.document.reader import read_text
+from osimlite.mechanics.multibody import Mechanism, build_mechanism
+from osimlite.mechanics.multibody.constraints import Lock
 from tests.oracle.opensim_runs import put
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.io.tables.storage import read_sto
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import (
     DeGrooteFregly2016Muscle,
@@ -21,7 +22,6 @@ from osimlite.schema.muscles import (
     Thelen2003Muscle,
 )
 from osimlite.schema.old_muscles import Schutte1993Muscle_Deprecated, Thelen2003Muscle_Deprecated
-from osimlite.simulation.files.storage import read_sto
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

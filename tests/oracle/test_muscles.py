@@ -7,7 +7,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import SimulationError
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.muscle_curves import (
     ActiveForceLengthCurve,
     FiberCompressiveForceCosPennationCurve,
@@ -17,7 +17,11 @@ from osimlite.schema.muscle_curves import (
     TendonForceLengthCurve,
 )
 from osimlite.schema.muscle_parts import MuscleFirstOrderActivationDynamicModel
-from osimlite.schema.muscles import Millard2012AccelerationMuscle, Millard2012EquilibriumMuscle, Thelen2003Muscle
+from osimlite.schema.muscles import (
+    Millard2012AccelerationMuscle,
+    Millard2012EquilibriumMuscle,
+    Thelen2003Muscle,
+)
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine

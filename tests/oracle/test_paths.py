@@ -10,7 +10,13 @@ import osimlite
 from osimlite import Body, Coordinate, Model, WrapCylinder, WrapEllipsoid, WrapSphere, WrapTorus
 from osimlite.schema.functions import LinearFunction, MultiplierFunction, SimmSpline, Sine
 from osimlite.schema.path_forces import PathSpring
-from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint, PathWrap
+from osimlite.schema.paths import (
+    ConditionalPathPoint,
+    GeometryPath,
+    MovingPathPoint,
+    PathPoint,
+    PathWrap,
+)
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

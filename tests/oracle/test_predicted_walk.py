@@ -13,7 +13,7 @@ import pytest
 
 import osimlite
 from benchmarks.predicted_walk import forward
-from osimlite.simulation.files.storage import read_sto
+from osimlite.io.tables.storage import read_sto
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = [pytest.mark.oracle, pytest.mark.skipif(find_spec("casadi") is None, reason="needs the casadi package")]

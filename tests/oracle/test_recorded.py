@@ -11,11 +11,11 @@ import pytest
 
 import osimlite
 from osimlite import Body, Coordinate, Model, SpringGeneralizedForce
-from osimlite.document.reader import read_text
-from osimlite.multibody import build_mechanism
+from osimlite.io.document.reader import read_text
+from osimlite.io.tables.storage import write_sto
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.files.recorded import RecordedMotion, exclude_forces
-from osimlite.simulation.files.storage import write_sto
+from osimlite.simulation.recorded_motion import RecordedMotion, exclude_forces
 from tests.oracle.opensim_runs import inverse_dynamics
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from osimlite.models.walking import write_scenario
-from osimlite.reflexes.scenario import Scenario
+from osimlite.studies.reflexes.scenario import Scenario
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

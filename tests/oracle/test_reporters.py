@@ -11,9 +11,13 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.io.tables.storage import read_sto
 from osimlite.schema.model import Model
-from osimlite.schema.probe_types import ActuatorForceProbe, ActuatorPowerProbe, JointInternalPowerProbe
-from osimlite.simulation.files.storage import read_sto
+from osimlite.schema.probe_types import (
+    ActuatorForceProbe,
+    ActuatorPowerProbe,
+    JointInternalPowerProbe,
+)
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.models.jumper import jumper
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.joints import ScapulothoracicJoint
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
-from osimlite.simulation.files.storage import read_sto, write_sto
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from osimlite.multibody.smoothing_spline import smoothing_spline
+from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
 
 opensim = pytest.importorskip("opensim")
 

@@ -9,7 +9,12 @@ from osimlite.schema.actuators import (
     CoordinateActuator,
 )
 from osimlite.schema.functions import LinearFunction, PolynomialFunction, SimmSpline
-from osimlite.schema.path_forces import Blankevoort1991Ligament, ExpressionBasedPathForce, Ligament, PathSpring
+from osimlite.schema.path_forces import (
+    Blankevoort1991Ligament,
+    ExpressionBasedPathForce,
+    Ligament,
+    PathSpring,
+)
 from osimlite.schema.springs import (
     BushingForce,
     ExpressionBasedBushingForce,

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.io.tables.storage import read_sto
 from osimlite.schema.muscles import Muscle
-from osimlite.simulation.files.storage import read_sto
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -112,7 +112,7 @@ def test_the_forces_give_the_accelerations_of_the_motion(arm: Path) -> None:
     moving = moved(model, file, found.forces)
     around = osimlite.kinematics(model, arm / "arm26_InverseKinematics.mot", lowpass=6.0).around
     assert around is not None
-    from osimlite.multibody.smoothing_spline import derivatives_of_samples
+    from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
 
     (speeds,) = derivatives_of_samples(*around, around[0], (1,), 3)
     (wanted,) = derivatives_of_samples(around[0], speeds, found.times, (1,), 3)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from osimlite.io.tables.trc import write_trc
 from osimlite.simulation import read_sto, write_sto
-from osimlite.simulation.files.trc import write_trc
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

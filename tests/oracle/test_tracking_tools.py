@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.io.tables.storage import StoTable, read_sto
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.document.reader import read, read_text
+from osimlite.io.document.reader import read, read_text
 from tests.conftest import ROOT
-from tests.document.upgrade.comparison import differences
+from tests.io.document.upgrade.comparison import differences
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

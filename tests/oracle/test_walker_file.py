@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from osimlite.document.printer import Numbers
+from osimlite.io.document.printer import Numbers
 from osimlite.models.dynamic_walker import dynamic_walker
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")

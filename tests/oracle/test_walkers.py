@@ -16,7 +16,7 @@ from osimlite.simulation import Simulation
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 from benchmarks._opensim_walks import Order, opensim_walks
-from osimlite.gait.steps import walk_many
+from osimlite.studies.gait.steps import walk_many
 
 pytestmark = [pytest.mark.oracle, pytest.mark.timeout(900)]
 

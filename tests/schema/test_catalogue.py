@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from osimlite.document.lexical import formatter
+from osimlite.io.document.lexical import formatter
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.registry import MODULES, class_for, tags

@@ -164,4 +164,4 @@ def test_a_class_that_is_not_there_is_answered_with_the_nearest() -> None:
 
 def test_parts_of_the_package_are_there_without_being_imported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(osimlite, "gait", raising=False)
-    assert osimlite.gait.__name__ == "osimlite.gait"
+    assert osimlite.studies.gait.__name__ == "osimlite.studies.gait"

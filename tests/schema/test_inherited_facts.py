@@ -8,7 +8,7 @@ from operator import attrgetter
 
 import pytest
 
-from osimlite.document.source import Source
+from osimlite.io.document.source import Source
 from osimlite.lint import validate
 from osimlite.schema.base import Object
 from osimlite.schema.facts import Facts

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from osimlite.document.printer import to_text
+from osimlite.io.document.printer import to_text
 from osimlite.schema.contact_forces import MeyerFregly2016Force
 from osimlite.schema.frames import Body
 from osimlite.schema.markers import Station

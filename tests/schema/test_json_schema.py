@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from osimlite.document.data import to_data
+from osimlite.io.document.data import to_data
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.json_schema import json_schema
 from osimlite.schema.registry import tags
@@ -58,8 +58,8 @@ def test_a_model_is_valid(validator: Any) -> None:
     ],
 )
 def test_what_the_reader_refuses_the_schema_refuses(validator: Any, damage: dict[str, Any], word: str) -> None:
-    from osimlite.document.data import from_data
     from osimlite.errors import ModelError
+    from osimlite.io.document.data import from_data
 
     assert word in str(next(iter(validator.iter_errors({"name": "m", **damage}))))
     with pytest.raises(ModelError):

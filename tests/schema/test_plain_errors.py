@@ -6,7 +6,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import ModelError
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 
 
 def test_properties_have_names():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from osimlite.document.reader import read_text
+from osimlite.io.document.reader import read_text
 from osimlite.schema.difference import differences
 from tests.lint.verdict_cases import small_model
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.kernels import record
-from osimlite.kernels.layout import MODEL, WORK
-from osimlite.kernels.table import LAW_NUMBERS
+from osimlite.mechanics.kernels import record
+from osimlite.mechanics.kernels.layout import MODEL, WORK
+from osimlite.mechanics.kernels.table import LAW_NUMBERS
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.linking import PYTHON, Program
 from osimlite.simulation.pack import Packed

@@ -7,7 +7,15 @@ from typing import Any
 import pytest
 
 import osimlite
-from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model
+from osimlite import (
+    Body,
+    ContactHalfSpace,
+    ContactSphere,
+    Coordinate,
+    CoordinateLimitForce,
+    HuntCrossleyForce,
+    Model,
+)
 from osimlite.schema.actuators import (
     BodyActuator,
     CoordinateActuator,
@@ -32,7 +40,12 @@ from osimlite.schema.functions import (
 )
 from osimlite.schema.markers import Station
 from osimlite.schema.path_actuators import McKibbenActuator, PathActuator
-from osimlite.schema.path_forces import Blankevoort1991Ligament, ExpressionBasedPathForce, Ligament, PathSpring
+from osimlite.schema.path_forces import (
+    Blankevoort1991Ligament,
+    ExpressionBasedPathForce,
+    Ligament,
+    PathSpring,
+)
 from osimlite.schema.paths import (
     ConditionalPathPoint,
     FunctionBasedPath,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from osimlite.errors import SimulationError
-from osimlite.kernels.layout import MODEL, RUN
+from osimlite.mechanics.kernels.layout import MODEL, RUN
 from osimlite.models.jumper import jumper
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
 from osimlite.simulation.run import Simulation

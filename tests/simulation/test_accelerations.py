@@ -12,9 +12,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import osimlite
-from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model
+from osimlite import (
+    Body,
+    ContactHalfSpace,
+    ContactSphere,
+    Coordinate,
+    CoordinateLimitForce,
+    HuntCrossleyForce,
+    Model,
+)
 from osimlite.errors import SimulationError
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.simulation.elements import Forces, force_elements
 from tests.suite import choose
 

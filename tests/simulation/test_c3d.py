@@ -11,10 +11,10 @@ import pytest
 
 import osimlite
 from osimlite.errors import DocumentError, MissingFileError
+from osimlite.io.tables.c3d import read_c3d_forces
+from osimlite.io.tables.storage import write_sto
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation.elements.external_loads import read_external_loads
-from osimlite.simulation.files.c3d import read_c3d_forces
-from osimlite.simulation.files.storage import write_sto
 
 pytest.importorskip("ezc3d", reason="needs ezc3d (extra 'c3d')")
 

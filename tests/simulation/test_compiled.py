@@ -18,12 +18,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import osimlite
-from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model
+from osimlite import (
+    Body,
+    ContactHalfSpace,
+    ContactSphere,
+    Coordinate,
+    CoordinateLimitForce,
+    HuntCrossleyForce,
+    Model,
+)
 from osimlite.errors import OsimliteError, SimulationError
-from osimlite.kernels.layout import OUTCOME, STAGE
-from osimlite.multibody import build_mechanism
-from osimlite.multibody import functions as f
-from osimlite.multibody.joints import (
+from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody import functions as f
+from osimlite.mechanics.multibody.joints import (
     MOTIONS,
     Mobilizer,
     TransformAxis,
@@ -32,9 +40,14 @@ from osimlite.multibody.joints import (
     ellipsoid,
     scapulothoracic,
 )
-from osimlite.multibody.mechanism import CoordinateInfo, MassProperties, Mechanism, MobileBody
-from osimlite.multibody.smoothing_spline import smoothing_spline
-from osimlite.multibody.spatial import offset
+from osimlite.mechanics.multibody.mechanism import (
+    CoordinateInfo,
+    MassProperties,
+    Mechanism,
+    MobileBody,
+)
+from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
+from osimlite.mechanics.multibody.spatial import offset
 from osimlite.schema.functions import PiecewiseConstantFunction
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import Forces, force_elements

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from osimlite import Coordinate, Model
 from osimlite.errors import SimulationError, UnsupportedError
-from osimlite.kernels import least_squares as ls
-from osimlite.kernels.layout import MODEL, OUTCOME, STAGE, WORK
-from osimlite.multibody import Mechanism, build_mechanism
-from osimlite.multibody import functions as f
-from osimlite.multibody.constraints import Coupler, Prescribed
+from osimlite.mechanics.kernels import least_squares as ls
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
+from osimlite.mechanics.multibody import Mechanism, build_mechanism
+from osimlite.mechanics.multibody import functions as f
+from osimlite.mechanics.multibody.constraints import Coupler, Prescribed
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.functions import Sine
 from osimlite.simulation import Simulation, simulate
@@ -27,7 +27,7 @@ from osimlite.simulation.engines.linking import PYTHON
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.many import ENDINGS, Watch, run_many
 from osimlite.simulation.system import System
-from tests.multibody.strategies import KINDS, Case, cases, constraint_of
+from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_of
 from tests.simulation.test_constrained import MODELS, four_bars, knee, patella, pins
 
 

@@ -9,12 +9,12 @@ import pytest
 
 import osimlite
 from osimlite import HuntCrossleyForce
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.functions import Constant as NumericConstant
-from osimlite.multibody.functions import Linear as NumericLinear
-from osimlite.multibody.mechanism import FramePlacement
-from osimlite.multibody.smoothing_spline import smoothing_spline
-from osimlite.multibody.spatial import offset
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.functions import Constant as NumericConstant
+from osimlite.mechanics.multibody.functions import Linear as NumericLinear
+from osimlite.mechanics.multibody.mechanism import FramePlacement
+from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
+from osimlite.mechanics.multibody.spatial import offset
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements import Forces, force_elements
@@ -22,14 +22,22 @@ from osimlite.simulation.elements.kind import kinds as declared_kinds
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
-from osimlite.kernels.layout import OUTCOME, STAGE
+from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
 from osimlite.simulation.elements.external_loads import external_load
 from osimlite.simulation.elements.geometries.load import Load
 from osimlite.simulation.engines.bullet.engine import BulletEngine
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON
 from osimlite.simulation.system import System
-from tests.simulation.force_cases import FORCE_NAMES, FORCES, chain, contact, floor, stone, with_force
+from tests.simulation.force_cases import (
+    FORCE_NAMES,
+    FORCES,
+    chain,
+    contact,
+    floor,
+    stone,
+    with_force,
+)
 from tests.suite import choose
 
 

@@ -9,8 +9,8 @@ from osimlite import ContactMesh, ContactSphere
 from osimlite.errors import UnsupportedError
 from osimlite.schema.contact_forces import ElasticFoundationForce
 from osimlite.simulation.elements.foundation import Springs
-from osimlite.sweep import registry
-from osimlite.sweep.plan import plan
+from osimlite.studies.sweep import registry
+from osimlite.studies.sweep.plan import plan
 from tests.simulation.force_cases import chain, floor
 from tests.simulation.meshes import ball, block, write_obj
 from tests.simulation.test_compiled_forces import assert_same, engines, states

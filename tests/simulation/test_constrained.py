@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 
 import osimlite
 from osimlite import Body, Coordinate, Model
-from osimlite.document.reader import read_text
 from osimlite.errors import SimulationError, UnsupportedError
-from osimlite.multibody import Mechanism, build_mechanism
-from osimlite.multibody import functions as f
-from osimlite.multibody.joints import Mobilizer, TransformAxis, custom
-from osimlite.multibody.mechanism import CoordinateInfo, MassProperties, MobileBody
+from osimlite.io.document.reader import read_text
+from osimlite.mechanics.multibody import Mechanism, build_mechanism
+from osimlite.mechanics.multibody import functions as f
+from osimlite.mechanics.multibody.joints import Mobilizer, TransformAxis, custom
+from osimlite.mechanics.multibody.mechanism import CoordinateInfo, MassProperties, MobileBody
 from osimlite.schema import constraint_types as kinds
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.forces import Force
@@ -27,7 +27,7 @@ from osimlite.schema.functions import LinearFunction, PolynomialFunction, SimmSp
 from osimlite.simulation import Simulation, simulate
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.protocol import Settings
-from tests.multibody.strategies import KINDS, Case, cases, constraint_of
+from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_of
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 

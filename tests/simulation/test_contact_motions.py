@@ -7,7 +7,15 @@ from math import exp, log, log1p, pi, radians, tan
 import numpy as np
 import pytest
 
-from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, HuntCrossleyForce, Model, PlanarJoint
+from osimlite import (
+    Body,
+    ContactHalfSpace,
+    ContactSphere,
+    Coordinate,
+    HuntCrossleyForce,
+    Model,
+    PlanarJoint,
+)
 from osimlite.simulation import Simulation
 
 MASS, RADIUS, STIFFNESS, GRAVITY = 2.0, 0.1, 1e6, 9.80665

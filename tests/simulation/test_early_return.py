@@ -9,10 +9,10 @@ import pytest
 
 import osimlite
 from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, HuntCrossleyForce, Model
-from osimlite.forces.hunt_crossley import half_space_sphere
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.laws.hunt_crossley import half_space_sphere
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.simulation.elements import force_elements
-from tests.forces.contact_sets import contact_forces, simbody_pair_order
+from tests.mechanics.laws.contact_sets import contact_forces, simbody_pair_order
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 

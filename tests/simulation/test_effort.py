@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.random import Generator, default_rng
 
-from osimlite.kernels.effort import effort_room
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.kernels.effort import effort_room
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.engines.linking import PYTHON, Code, best
 
 optimize: Any = pytest.importorskip("scipy.optimize", reason="needs scipy (extra 'sweep')")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from osimlite.errors import DocumentError, MissingFileError, UnsupportedError
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.frames import Body
 from osimlite.schema.functions import Constant, FunctionSet
 from osimlite.schema.joints import FreeJoint

@@ -20,14 +20,27 @@ from osimlite import (
     SliderJoint,
 )
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
 from osimlite.schema.contact import ContactEllipsoid
 from osimlite.schema.contact_forces import ExponentialContactForce
 from osimlite.schema.controller_types import CMC, PrescribedController
-from osimlite.schema.functions import Constant, Function, LinearFunction, PolynomialFunction, SimmSpline, Sine
+from osimlite.schema.functions import (
+    Constant,
+    Function,
+    LinearFunction,
+    PolynomialFunction,
+    SimmSpline,
+    Sine,
+)
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
-from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint, PathWrap
+from osimlite.schema.paths import (
+    ConditionalPathPoint,
+    GeometryPath,
+    MovingPathPoint,
+    PathPoint,
+    PathWrap,
+)
 from osimlite.schema.springs import (
     BushingForce,
     ExpressionBasedCoordinateForce,

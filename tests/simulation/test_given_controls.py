@@ -8,7 +8,7 @@ import pytest
 import osimlite
 from osimlite import Model
 from osimlite.errors import DoubtfulWarning, OsimliteError, SimulationError
-from osimlite.multibody.functions import Sine
+from osimlite.mechanics.multibody.functions import Sine
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
 from osimlite.schema.controller_types import PrescribedController, SynergyController, SynergyVector
 from osimlite.schema.functions import Constant, LinearFunction

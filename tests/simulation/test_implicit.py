@@ -10,12 +10,20 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite import Body, ContactHalfSpace, ContactSphere, Coordinate, HuntCrossleyForce, Model, PlanarJoint
+from osimlite import (
+    Body,
+    ContactHalfSpace,
+    ContactSphere,
+    Coordinate,
+    HuntCrossleyForce,
+    Model,
+    PlanarJoint,
+)
 from osimlite.errors import SettingError
-from osimlite.kernels.condensation import condensation_room, condense, correct, linearise
-from osimlite.kernels.layout import MODEL, OUTCOME, STAGE
-from osimlite.kernels.rosenbrock import ALPHA, EMBEDDED, GAMMA, WEIGHTS
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.kernels.condensation import condensation_room, condense, correct, linearise
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE
+from osimlite.mechanics.kernels.rosenbrock import ALPHA, EMBEDDED, GAMMA, WEIGHTS
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.controlled_steps import ControlledSteps

@@ -10,10 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.errors import OsimliteError, SimulationError
-from osimlite.kernels.step_sizes import next_step_size
+from osimlite.mechanics.kernels.step_sizes import next_step_size
 from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.stepper import IntegrationError
-from tests.simulation.equations import Counting, cannon, last, oscillator, pendulum, runge_kutta_merson
+from tests.simulation.equations import (
+    Counting,
+    cannon,
+    last,
+    oscillator,
+    pendulum,
+    runge_kutta_merson,
+)
 
 # ------------------------------------------------------------------------------------------------- Merson's method
 

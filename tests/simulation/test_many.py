@@ -167,7 +167,7 @@ def test_settings_without_meaning_are_refused(engine, starts, settings, why):
 
 
 def test_endings_are_those_of_the_machine_code():
-    from osimlite.kernels import record
+    from osimlite.mechanics.kernels import record
 
     words = {record.DONE: "done", record.FAILED: "failed", record.STOPPED: "stopped", record.TOO_MANY: "too many steps"}
     assert words == ENDINGS

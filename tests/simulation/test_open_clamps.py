@@ -7,7 +7,7 @@ from math import pi
 import pytest
 
 import osimlite
-from osimlite.document.reader import read_text
+from osimlite.io.document.reader import read_text
 from tests.lint.verdict_cases import CASES
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import ModelError
-from osimlite.multibody.spatial import inverse
+from osimlite.mechanics.multibody.spatial import inverse
 from osimlite.schema.functions import Constant, Sine
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.paths import MovingPathPoint, PathPoint

@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 
 import osimlite
 from osimlite.errors import SimulationError
-from osimlite.kernels.eigenvalues import diagonalize
-from osimlite.multibody import Mechanism, build_mechanism
-from osimlite.multibody import functions as f
-from osimlite.multibody.assembly import tolerance_of
-from osimlite.multibody.constraints import Coupler, Prescribed
+from osimlite.mechanics.kernels.eigenvalues import diagonalize
+from osimlite.mechanics.multibody import Mechanism, build_mechanism
+from osimlite.mechanics.multibody import functions as f
+from osimlite.mechanics.multibody.assembly import tolerance_of
+from osimlite.mechanics.multibody.constraints import Coupler, Prescribed
 from osimlite.simulation.engines.linking import COMPILED, PYTHON, Code
-from osimlite.simulation.files.recorded import RecordedMotion
 from osimlite.simulation.pose_assembly import assemble_motion
-from tests.multibody.strategies import KINDS, Case, cases, constraint_of
+from osimlite.simulation.recorded_motion import RecordedMotion
+from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_of
 from tests.simulation.checked import Checked
 from tests.suite import choose
 

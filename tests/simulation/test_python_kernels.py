@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.kernels.layout import MODEL
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.kernels.layout import MODEL
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine
 from tests.simulation.checked import Checked, bounded

@@ -11,7 +11,15 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite import Body, Coordinate, CoordinateLimitForce, HuntCrossleyForce, Model, PinJoint, WeldJoint
+from osimlite import (
+    Body,
+    Coordinate,
+    CoordinateLimitForce,
+    HuntCrossleyForce,
+    Model,
+    PinJoint,
+    WeldJoint,
+)
 from osimlite.errors import (
     DoubtfulWarning,
     ModelError,

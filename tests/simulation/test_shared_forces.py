@@ -9,7 +9,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import ModelError, OsimliteError, SettingError, UnsupportedError
-from osimlite.simulation.files.storage import read_sto
+from osimlite.io.tables.storage import read_sto
 
 TIMES = np.linspace(0.0, 1.0, 51)
 UP = 0.5 * TIMES**2

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.simulation import Simulation, read_sto, write_sto
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.states import StateLayout, StateVariable

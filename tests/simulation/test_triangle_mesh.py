@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from osimlite.errors import ModelError, OsimliteError
-from osimlite.meshes.folders import MeshFolders
+from osimlite.io.meshes.folders import MeshFolders
 from osimlite.simulation.elements.triangle_mesh import TriangleMesh
 from tests.simulation.meshes import WRITERS, ball, block, triangles
 

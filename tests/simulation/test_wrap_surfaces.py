@@ -9,10 +9,10 @@ from math import isnan
 import numpy as np
 import pytest
 
-from osimlite.kernels import wrapping
-from osimlite.kernels.layout import ITEM
-from osimlite.kernels.wrap_cylinder import settled
-from osimlite.multibody.spatial import inverse, offset, transform
+from osimlite.mechanics.kernels import wrapping
+from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.kernels.wrap_cylinder import settled
+from osimlite.mechanics.multibody.spatial import inverse, offset, transform
 from osimlite.simulation.engines.linking import COMPILED
 from tests.conftest import ROOT
 from tests.simulation.checked import Checked

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.simulation.files.storage import read_sto
+from osimlite.io.tables.storage import read_sto
 from osimlite.tools.running import run
 
 REFERENCE = "oracle/tools/reference"

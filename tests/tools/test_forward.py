@@ -11,7 +11,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.simulation.files.storage import read_sto
+from osimlite.io.tables.storage import read_sto
 from osimlite.simulation.start import columns_of_states
 
 SETUP = """<OpenSimDocument Version="40600">

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.schema.model import Model
-from osimlite.simulation.files.storage import read_sto, write_sto
 
 SETUP = """<OpenSimDocument Version="40600"><AnalyzeTool name="it">
     <model_file>model.osim</model_file><coordinates_file>motion.sto</coordinates_file>

@@ -13,7 +13,7 @@ pytest.importorskip("scipy", reason="needs scipy (extra 'sim')")
 
 import osimlite
 from osimlite.errors import DoubtfulWarning
-from osimlite.simulation.files.storage import read_sto
+from osimlite.io.tables.storage import read_sto
 from tests.cli.command import run
 from tests.labs import change, copy_lab
 

@@ -12,13 +12,13 @@ pytest.importorskip("scipy", reason="needs scipy (extra 'sim')")
 import numpy as np
 
 import osimlite
+from osimlite.io.tables.storage import StoTable, write_sto
 from osimlite.models.jumper import jumper
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle, RigidTendonMuscle
 from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated
 from osimlite.schema.probe_types import ActuatorPowerProbe
-from osimlite.simulation.files.storage import StoTable, write_sto
 from osimlite.tools.job import NotRunnable
 
 SETUP = """<OpenSimDocument Version="40600">

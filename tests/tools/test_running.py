@@ -12,7 +12,7 @@ import numpy as np
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.simulation.files.storage import read_sto, write_sto
+from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.tools.job import NotRunnable
 from osimlite.tools.running import FaultySetup
 from tests.cli.command import run

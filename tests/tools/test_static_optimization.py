@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.tools.job import NotRunnable
 
 ACTIVATION, FORCE = "walk_StaticOptimization_activation.sto", "walk_StaticOptimization_force.sto"

@@ -9,7 +9,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.simulation.files.storage import write_sto
+from osimlite.io.tables.storage import write_sto
 
 SETUP = """<OpenSimDocument Version="40600">
     <{tool} name="it">

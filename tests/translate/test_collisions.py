@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from osimlite.errors import OsimliteError
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.multibody import build_mechanism
-from osimlite.robot.urdf import UNLIMITED, urdf_text
 from osimlite.schema.actuators import ActivationCoordinateActuator, CoordinateActuator
 from osimlite.schema.contact import (
     ContactCylinder,
@@ -24,8 +23,9 @@ from osimlite.schema.contact import (
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import PhysicalOffsetFrame
 from osimlite.schema.joints import SliderJoint
+from osimlite.simulation.robot.urdf import UNLIMITED, urdf_text
 from osimlite.translate import build_robot, to_urdf
-from tests.robot.readers import in_bullet, written
+from tests.simulation.robot.readers import in_bullet, written
 from tests.translate.test_export import kinds, one_body, unaccounted
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.document.reader import read_text
 from osimlite.errors import OsimliteError
+from osimlite.io.document.reader import read_text
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.base import Unknown
 from osimlite.schema.contact import ContactGeometry
@@ -35,7 +35,7 @@ from osimlite.schema.model import Model
 from osimlite.translate import to_urdf
 from osimlite.translate.export import Urdf
 from osimlite.translate.survey import CONTAINERS
-from tests.robot.readers import in_bullet, mujoco_poses, worst_body, yourdfpy_poses
+from tests.simulation.robot.readers import in_bullet, mujoco_poses, worst_body, yourdfpy_poses
 from tests.translate.evaluator import Reader
 
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from osimlite.errors import OsimliteError
-from osimlite.meshes.stl import binary_stl
+from osimlite.io.meshes.stl import binary_stl
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.geometry import Appearance, Mesh
 from osimlite.translate import to_urdf
 from osimlite.translate.export import Urdf
-from tests.robot.readers import in_bullet, written
+from tests.simulation.robot.readers import in_bullet, written
 from tests.translate.test_export import kinds, one_body, vertices, visuals
 
 TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))

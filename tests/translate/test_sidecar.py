@@ -13,23 +13,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.document.reader import read_text
 from osimlite.errors import UnsupportedError
+from osimlite.io.document.reader import read_text
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody import functions as f
+from osimlite.mechanics.multibody.arc import ArcPoint
+from osimlite.mechanics.multibody.constraints import Coupler
+from osimlite.mechanics.multibody.functions import Function, Linear, Scaled
+from osimlite.mechanics.multibody.joints import TransformAxis, custom
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
+from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.multibody import build_mechanism
-from osimlite.multibody import functions as f
-from osimlite.multibody.arc import ArcPoint
-from osimlite.multibody.constraints import Coupler
-from osimlite.multibody.functions import Function, Linear, Scaled
-from osimlite.multibody.joints import TransformAxis, custom
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
-from osimlite.multibody.smoothing_spline import smoothing_spline
-from osimlite.robot.build import build_robot
-from osimlite.robot.merge_fixed import merge_fixed
-from osimlite.robot.mimics import mimics
-from osimlite.robot.names import legal_names
-from osimlite.robot.urdf import urdf_text
 from osimlite.schema.constraint_types import CoordinateCouplerConstraint
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.coordinates import Coordinate
@@ -37,15 +32,25 @@ from osimlite.schema.custom_joint import CustomJoint, SpatialTransform
 from osimlite.schema.custom_joint import TransformAxis as SchemaAxis
 from osimlite.schema.frames import Body
 from osimlite.schema.functions import Function as SchemaFunction
-from osimlite.schema.functions import LinearFunction, MultiplierFunction, PolynomialFunction, SimmSpline
+from osimlite.schema.functions import (
+    LinearFunction,
+    MultiplierFunction,
+    PolynomialFunction,
+    SimmSpline,
+)
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
+from osimlite.simulation.robot.build import build_robot
+from osimlite.simulation.robot.merge_fixed import merge_fixed
+from osimlite.simulation.robot.mimics import mimics
+from osimlite.simulation.robot.names import legal_names
+from osimlite.simulation.robot.urdf import urdf_text
 from osimlite.translate import to_urdf
 from osimlite.translate.function_data import as_data
 from osimlite.translate.sidecar import coordinates_json
-from tests.multibody.strategies import Case, cases
-from tests.robot.readers import mujoco_poses, worst_body, yourdfpy_poses
-from tests.robot.test_robot import one_body
+from tests.mechanics.multibody.strategies import Case, cases
+from tests.simulation.robot.readers import mujoco_poses, worst_body, yourdfpy_poses
+from tests.simulation.robot.test_robot import one_body
 from tests.translate.evaluator import Reader, evaluate
 
 
@@ -161,7 +166,7 @@ def test_no_function_is_forgotten():
         result = {cls} if not getattr(cls, "__abstractmethods__", None) else set()
         return result.union(*(below(item) for item in cls.__subclasses__()))
 
-    ours = {cls for cls in below(Function) if cls.__module__.startswith("osimlite.multibody")}
+    ours = {cls for cls in below(Function) if cls.__module__.startswith("osimlite.mechanics.multibody")}
     # An error of Simbody's accelerations is no part of a pose.
     assert ours - {AccelerationErrorAngle} == {type(function) for function, _ in FUNCTIONS}
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.spatial import Array
 
 
 @dataclass

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from osimlite import Model
+from osimlite.io.tables.storage import write_sto
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.multibody import build_mechanism
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.paths import PathPoint
-from osimlite.simulation.files.storage import write_sto
 from osimlite.view import Shown
 from osimlite.view.motion import activity
 from osimlite.view.recording import read_recording

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from osimlite.errors import MissingDependency, OsimliteError
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.multibody import build_mechanism
 from osimlite.schema.geometry import Mesh
 from osimlite.schema.model import Model
 from osimlite.view import animate

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.multibody import build_mechanism
 from osimlite.view import Shown, Story
 from tests.view.motions import Recorded, stroll
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.multibody import build_mechanism
 from osimlite.view.collect import build_scene
 from osimlite.view.glb import RATE, write_glb
 from osimlite.view.motion import in_mechanism_order

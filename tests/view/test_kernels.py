@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.constraints import Coupler
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.simulation.polylines import Course, Polylines
 from osimlite.view.kernels import kernels_text, program_data
 from tests.simulation.test_compiled import JOINTS, tree

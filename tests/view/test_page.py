@@ -13,9 +13,9 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
+from osimlite.io.tables.storage import write_sto
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.multibody import build_mechanism
-from osimlite.simulation.files.storage import write_sto
 from osimlite.view import Shown
 from osimlite.view.page import page_data, page_text
 from osimlite.view.recording import computed_forces, read_recording

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from osimlite.errors import MissingDependency, OsimliteError
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.multibody import build_mechanism
 from osimlite.simulation import simulate
 from osimlite.view import plot_simulation
 from osimlite.view.plots import STORED, draw_figures, energies, figure_of, lines_in

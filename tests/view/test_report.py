@@ -15,11 +15,11 @@ pytest.importorskip("matplotlib", reason="needs matplotlib (extra 'plot')")
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.multibody import build_mechanism
-from osimlite.simulation.files.storage import write_sto
+from osimlite.io.tables.storage import write_sto
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.tools.evidence import root_of, side_of, steps_of
 from osimlite.tools.outcome import Outcome
-from osimlite.view.report import Trial, collect_angles, collect_moments, report
+from osimlite.tools.report import Trial, collect_angles, collect_moments, report
 from tests.cli.command import run
 from tests.fitting.test_inverse_kinematics import free_body
 from tests.tools.test_many import make_trial

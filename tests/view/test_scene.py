@@ -7,11 +7,11 @@ import pytest
 
 from osimlite import Body, Coordinate, Model, SliderJoint
 from osimlite.errors import OsimliteError
-from osimlite.meshes import unit_shapes
-from osimlite.meshes.folders import MeshFolders
-from osimlite.meshes.read import read_surface
+from osimlite.io.meshes import unit_shapes
+from osimlite.io.meshes.folders import MeshFolders
+from osimlite.io.meshes.read import read_surface
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.multibody import build_mechanism
 from osimlite.schema.geometry import Brick, Cylinder, LineGeometry, Mesh, Sphere, Torus
 from osimlite.schema.wrapping import WrapTorus
 from osimlite.view.collect import build_scene

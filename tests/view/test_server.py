@@ -9,8 +9,8 @@ import socket
 import pytest
 
 import osimlite
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.multibody import build_mechanism
 from osimlite.view import server as module
 from osimlite.view.server import HOST, PageServer
 

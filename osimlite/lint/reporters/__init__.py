@@ -29,7 +29,7 @@ def render(
         OsimliteError: there is no such format.
     """
     if name not in FORMATS:
-        from osimlite.text import listed
+        from osimlite.base.text import listed
 
         raise OsimliteError(f"--format is one of {listed(FORMATS)}, not '{name}'")
     module = import_module(f"osimlite.lint.reporters.{name}")

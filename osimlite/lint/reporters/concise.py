@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from osimlite.base.text import visible
 from osimlite.lint.diagnostic import Report
 from osimlite.lint.reporters.fold import Fold, folded, told
 from osimlite.lint.reporters.style import painted, passed, summary, unmeasured
-from osimlite.text import visible
 
 
 def render(report: Report, *, colour: bool = False, everything: bool = False) -> str:

@@ -7,8 +7,8 @@ import re
 from collections.abc import Callable, Hashable, Iterable
 from typing import NamedTuple, TypeVar
 
+from osimlite.base.text import listed
 from osimlite.lint.diagnostic import Finding
-from osimlite.text import listed
 
 T = TypeVar("T")
 

@@ -6,10 +6,10 @@ import re
 import textwrap
 from itertools import groupby
 
+from osimlite.base.text import visible
 from osimlite.lint.diagnostic import Finding, Report
 from osimlite.lint.reporters.fold import Fold, folded, told
 from osimlite.lint.reporters.style import painted, passed, summary, unmeasured
-from osimlite.text import visible
 
 _ELLIPSIS = "..."
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from osimlite.base.text import visible
 from osimlite.lint.diagnostic import Finding, Report, Severity
-from osimlite.text import visible
 
 _LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "notice"}
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from osimlite.base.text import json_lines
 from osimlite.lint.diagnostic import Report
-from osimlite.text import json_lines
 
 
 def render(report: Report) -> str:

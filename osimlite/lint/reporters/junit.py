@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from lxml import etree
 
+from osimlite.base.text import harmless, visible
 from osimlite.lint.diagnostic import Finding, Report, Severity
-from osimlite.text import harmless, visible
 
 
 def render(report: Report) -> str:

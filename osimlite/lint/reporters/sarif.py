@@ -8,9 +8,9 @@ from typing import Any
 from urllib.parse import quote
 
 from osimlite import __version__
+from osimlite.base.text import json_lines
 from osimlite.lint.diagnostic import Finding, Report, Severity
 from osimlite.lint.engine import Rule, all_rules
-from osimlite.text import json_lines
 
 _SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 _LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "note"}

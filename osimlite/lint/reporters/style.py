@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from osimlite.base.text import visible
 from osimlite.lint.diagnostic import Report, Severity
-from osimlite.text import visible
 
 _CODES = {
     Severity.ERROR: "1;31",

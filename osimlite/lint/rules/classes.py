@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
-from osimlite.document.notes import Note
+from osimlite.base.text import nearest
+from osimlite.io.document.notes import Note
 from osimlite.lint.engine import ERROR, FindingSink, rule
 from osimlite.lint.fixes import renamed, replaced
 from osimlite.lint.old_tags import successor
@@ -16,7 +17,6 @@ from osimlite.schema.fields import Held
 from osimlite.schema.model import Model
 from osimlite.schema.registry import class_for, tags, tags_of
 from osimlite.schema.specs import FieldSpec, field_specs
-from osimlite.text import nearest
 
 
 @rule("OSIM102", "unknown-class", severity=ERROR, mends="both")

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from itertools import combinations
 from typing import Any
 
+from osimlite.base.text import listed
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.rules.references import broken_references
 from osimlite.lint.skeleton import base_of
@@ -16,7 +17,6 @@ from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.forces import Force
 from osimlite.schema.specs import defaults, reference_specs
 from osimlite.schema.tree import Use
-from osimlite.text import listed
 
 
 @rule("OSIM321", "contact-without-partner", severity=WARNING)

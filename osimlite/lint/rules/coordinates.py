@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from osimlite.document.lexical import shortest
+from osimlite.io.document.lexical import shortest
 from osimlite.lint.config import Threshold
 from osimlite.lint.constants import constant_value
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, cast
 
-from osimlite.forces.vectors import cross, norm
+from osimlite.base.text import listed, nearest
 from osimlite.lint.axes import axes_of, axes_refused, coordinates_of
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
+from osimlite.mechanics.laws.vectors import cross, norm
 from osimlite.schema.base import Unknown
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.functions import (
@@ -25,7 +26,6 @@ from osimlite.schema.functions import (
     SimmSpline,
 )
 from osimlite.schema.tree import is_a
-from osimlite.text import listed, nearest
 
 if TYPE_CHECKING:
     from osimlite.schema.custom_joint import CustomJoint

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any, NamedTuple
 
+from osimlite.base.text import listed, nearest
 from osimlite.lint.consequences import consequence
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject, once
@@ -16,7 +17,6 @@ from osimlite.schema.base import Object
 from osimlite.schema.facts import REFUSED
 from osimlite.schema.fields import Value, domain_test
 from osimlite.schema.specs import FieldSpec, lineage, value_specs
-from osimlite.text import listed, nearest
 
 
 @rule("OSIM205", "not-finite", severity=ERROR)

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
-from osimlite.forces.vectors import norm, plus, times
 from osimlite.lint.engine import ERROR, FindingSink, rule
 from osimlite.lint.placement import Pose, default_poses, on_base
 from osimlite.lint.skeleton import base_of
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
+from osimlite.mechanics.laws.vectors import norm, plus, times
 from osimlite.schema.base import Component
 from osimlite.schema.tree import is_a
 

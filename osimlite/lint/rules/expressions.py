@@ -46,7 +46,7 @@ def broken_expression(subject: Subject, report: FindingSink) -> None:
     """
     for item, tag, variables in _formulas(subject):
         # Few models have formulas, and reading them takes the kernels.
-        from osimlite.multibody.formula import Formula, UnknownVariableError
+        from osimlite.mechanics.multibody.formula import Formula, UnknownVariableError
 
         text = getattr(item, tag)
         try:

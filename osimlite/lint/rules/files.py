@@ -5,15 +5,15 @@ from __future__ import annotations
 import os
 from functools import lru_cache
 
-from osimlite.document.source import Source
-from osimlite.files import NAMED_SO
+from osimlite.base.files import NAMED_SO
+from osimlite.base.text import counted, listed
+from osimlite.io.document.source import Source
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
 from osimlite.schema.base import Object
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.geometry import Mesh
-from osimlite.text import counted, listed
 
 
 @rule("OSIM701", "missing-mesh", severity=WARNING)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from math import comb
 from typing import Final, cast
 
+from osimlite.base.text import counted
 from osimlite.lint.axes import axes_of
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
@@ -28,7 +29,6 @@ from osimlite.schema.functions import (
     StepFunction,
 )
 from osimlite.schema.paths import FunctionBasedPath
-from osimlite.text import counted
 
 Tabulated = SimmSpline | GCVSpline | PiecewiseLinearFunction | PiecewiseConstantFunction
 

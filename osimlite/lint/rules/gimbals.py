@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from osimlite.forces.vectors import dot
 from osimlite.lint.axes import coordinates_of
 from osimlite.lint.engine import ERROR, FindingSink, rule
 from osimlite.lint.placement import turning_axes
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
+from osimlite.mechanics.laws.vectors import dot
 from osimlite.schema.joints import Joint
 
 _LOCKED = 1e-8

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from osimlite.base.text import counted, listed
 from osimlite.lint.axes import axes_refused, coordinates_of, names_on_axes
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.skeleton import base_of, skeleton
@@ -10,7 +11,6 @@ from osimlite.lint.words import a, called
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Ground
 from osimlite.schema.joints import Joint
-from osimlite.text import counted, listed
 
 
 @rule("OSIM402", "joint-to-itself", severity=ERROR)

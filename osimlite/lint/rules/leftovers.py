@@ -6,10 +6,11 @@ import re
 from collections.abc import Iterator
 from math import isfinite
 
-from osimlite.document.lexical import ABSENT, Unclean, converter
-from osimlite.document.names import ATTRIBUTE
-from osimlite.document.source import Source
-from osimlite.document.spans import blank_remarks
+from osimlite.base.text import nearest
+from osimlite.io.document.lexical import ABSENT, Unclean, converter
+from osimlite.io.document.names import ATTRIBUTE
+from osimlite.io.document.source import Source
+from osimlite.io.document.spans import blank_remarks
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import without_attribute, without_element, without_text
 from osimlite.lint.subject import Subject
@@ -18,7 +19,6 @@ from osimlite.schema.base import Component
 from osimlite.schema.fields import Value
 from osimlite.schema.forces import Force
 from osimlite.schema.specs import field_specs
-from osimlite.text import nearest
 
 
 @rule("OSIM105", "unknown-attribute", severity=ERROR, mends="safe")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from math import hypot
 
-from osimlite.document.source import Position
+from osimlite.io.document.source import Position
+from osimlite.io.tables.headers import METRES
 from osimlite.lint.engine import INFO, WARNING, FindingSink, rule
 from osimlite.lint.table import Table
-from osimlite.tables import METRES
 
 _LARGEST, _SMALLEST = 8.0, 0.02
 """Between these, m, is how far the markers of one frame are spread."""

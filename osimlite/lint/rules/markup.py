@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from osimlite.document.source import Source
-from osimlite.document.spans import blank_remarks
+from osimlite.io.document.source import Source
+from osimlite.io.document.spans import blank_remarks
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced, without_text

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from osimlite.base.text import listed
 from osimlite.lint.config import Threshold
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.measures import MEASURES, MovingPoint, measures_of
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
-from osimlite.text import listed
 
 SHOWN = 5e-6
 """Less (m) is no error of the default pose."""

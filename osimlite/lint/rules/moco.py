@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from itertools import chain
 from typing import Any
 
+from osimlite.base.text import listed
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.posture import angles_of, coordinate_of
 from osimlite.lint.setup import Setup, members
@@ -17,7 +18,6 @@ from osimlite.schema.fields import Reference, Value
 from osimlite.schema.specs import field_specs, file_specs, member_specs
 from osimlite.schema.states import variables
 from osimlite.schema.tree import Tree, is_a
-from osimlite.text import listed
 
 _ALLOW = ("allow_unused_references", "kinematics_allow_extra_columns")
 """What lets a table have columns that nothing follows."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from osimlite.forces.vectors import Vector
 from osimlite.lint.config import Threshold
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.placement import default_poses, on_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
+from osimlite.mechanics.laws.vectors import Vector
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from osimlite.base.text import counted, listed
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.rules.references import Broken, broken_references
 from osimlite.lint.subject import Subject, once
@@ -13,7 +14,6 @@ from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
 from osimlite.schema.sets import ModelComponentSet
 from osimlite.schema.tree import ILLEGAL_CHARACTERS, is_a
-from osimlite.text import counted, listed
 
 _ILLEGAL = frozenset(ILLEGAL_CHARACTERS)
 

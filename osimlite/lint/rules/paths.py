@@ -6,6 +6,7 @@ import math
 from itertools import pairwise
 from math import pi, radians
 
+from osimlite.base.text import counted
 from osimlite.lint.config import Threshold
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
@@ -16,7 +17,6 @@ from osimlite.schema.joints import Joint
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint
 from osimlite.schema.states import motions_of
 from osimlite.schema.wrapping import WrapObject
-from osimlite.text import counted
 
 
 @rule("OSIM611", "short-path", severity=ERROR)

@@ -10,7 +10,11 @@ from osimlite.lint.engine import INFO, WARNING, FindingSink, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called, quantity
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.forces import CoordinateLimitForce, HuntCrossleyContactParameters, HuntCrossleyForce
+from osimlite.schema.forces import (
+    CoordinateLimitForce,
+    HuntCrossleyContactParameters,
+    HuntCrossleyForce,
+)
 from osimlite.schema.joints import Joint
 from osimlite.schema.states import motions_of
 from osimlite.schema.tree import Use

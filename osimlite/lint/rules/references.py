@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple, cast
 
-from osimlite.document.source import Source
+from osimlite.base.text import listed, nearest
+from osimlite.io.document.source import Source
 from osimlite.lint.axes import axes_refused, made_up_paths
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced
@@ -17,7 +18,6 @@ from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
 from osimlite.schema.specs import reference_specs
 from osimlite.schema.tree import Resolution, Use, is_a, normalised
-from osimlite.text import listed, nearest
 
 if TYPE_CHECKING:
     from osimlite.schema.custom_joint import CustomJoint

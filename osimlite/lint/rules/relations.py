@@ -6,7 +6,12 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
-from osimlite.forces.muscle_curves import (
+from osimlite.base.text import counted
+from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
+from osimlite.lint.rules.domains import outside
+from osimlite.lint.subject import Subject
+from osimlite.lint.words import called, quantity
+from osimlite.mechanics.laws.muscle_curves import (
     active_force_length,
     fiber_compressive_force_cos_pennation,
     fiber_compressive_force_length,
@@ -14,10 +19,6 @@ from osimlite.forces.muscle_curves import (
     force_velocity,
     tendon_force_length,
 )
-from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
-from osimlite.lint.rules.domains import outside
-from osimlite.lint.subject import Subject
-from osimlite.lint.words import called, quantity
 from osimlite.schema.base import Object
 from osimlite.schema.facts import REFUSED, Contradiction
 from osimlite.schema.functions import (
@@ -35,7 +36,6 @@ from osimlite.schema.functions import (
     StepFunction,
 )
 from osimlite.schema.tree import is_a
-from osimlite.text import counted
 
 
 @rule("OSIM209", "contradicting-values", severity=ERROR)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from osimlite.base.text import listed
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup, content_of, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import meant, nearest_name
 from osimlite.schema.states import variables
 from osimlite.schema.tree import is_a
-from osimlite.text import listed
 
 
 @rule("OSIM842", "missing-column", severity=WARNING, about="document")

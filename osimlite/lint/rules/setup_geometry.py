@@ -7,14 +7,14 @@ from collections.abc import Sequence, Set
 from itertools import islice
 from typing import Any
 
+from osimlite.base.text import counted
+from osimlite.io.tables.headers import METRES
 from osimlite.lint.engine import WARNING, FindingSink, rule
 from osimlite.lint.posture import marker_places
 from osimlite.lint.rules.setup_markers import cells_of, marker_users, rows_between
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import called
-from osimlite.tables import METRES
-from osimlite.text import counted
 
 _LEAST, _MOST = 0.5, 2.0
 """Between these a factor that scales a body can be believed."""

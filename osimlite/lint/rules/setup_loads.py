@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from osimlite.forces.vectors import Vector, dot
+from osimlite.base.text import listed
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.placement import Pose, on_base
 from osimlite.lint.posture import model_subject, poses_in
@@ -14,8 +14,8 @@ from osimlite.lint.setup import Setup, members, motion_of
 from osimlite.lint.subject import once
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, nearest_name
+from osimlite.mechanics.laws.vectors import Vector, dot
 from osimlite.schema.tree import is_a
-from osimlite.text import listed
 
 _TIMES = 16
 """How many times of a motion are looked at."""

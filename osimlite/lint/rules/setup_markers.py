@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from itertools import islice
 from typing import Any
 
+from osimlite.base.text import counted
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.scan import number_in
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
 from osimlite.lint.words import nearest_name
-from osimlite.text import counted
 
 
 def marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:

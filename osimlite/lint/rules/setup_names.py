@@ -6,6 +6,7 @@ import re
 from functools import cache
 from typing import Any
 
+from osimlite.base.text import listed
 from osimlite.lint.checked import Where
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup
@@ -15,7 +16,6 @@ from osimlite.schema.fields import Reference
 from osimlite.schema.specs import reference_specs
 from osimlite.schema.states import variables
 from osimlite.schema.tree import Tree, Use, is_a
-from osimlite.text import listed
 
 _KINDS = ("actuator", "body", "coordinate", "frame", "joint", "marker", "muscle")
 """What the rules of references are about that look a name up in one place of the model; their names begin with it."""

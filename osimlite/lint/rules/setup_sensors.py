@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from osimlite.base.text import listed
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup
 from osimlite.lint.table import Table
 from osimlite.lint.words import called, meant, nearest_name
-from osimlite.text import listed
 
 
 def _orientations(setup: Setup) -> Iterator[tuple[Any, str, str, Table]]:

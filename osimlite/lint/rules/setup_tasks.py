@@ -6,12 +6,12 @@ import math
 from collections import Counter
 from typing import Any
 
+from osimlite.base.text import listed
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.posture import angles_of
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.words import called
 from osimlite.schema.tree import is_a
-from osimlite.text import listed
 
 
 @rule("OSIM851", "task-weight", severity=ERROR, about="document")

@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
+from osimlite.io.tables.headers import MarkerHeader
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.posture import angles_of, coordinate_of
 from osimlite.lint.rules.setup_columns import motions
@@ -16,7 +17,6 @@ from osimlite.lint.words import called
 from osimlite.schema.base import Object
 from osimlite.schema.specs import field_specs
 from osimlite.schema.tree import is_a
-from osimlite.tables import MarkerHeader
 
 _FIRST_STATES = 0.03
 """For how long computed muscle control runs to find the states of muscles at the start, s."""

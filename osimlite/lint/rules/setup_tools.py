@@ -7,11 +7,11 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
+from osimlite.base.text import listed
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.setup import Setup, is_given, members
 from osimlite.lint.words import called, nearest_name
 from osimlite.schema.tree import is_a
-from osimlite.text import listed
 
 _SETTINGS: tuple[tuple[str, str, str, Callable[[Any], bool], str], ...] = (
     ("pose-accuracy", "InverseKinematicsToolBase", "accuracy", lambda value: 0.01 < value < math.inf,

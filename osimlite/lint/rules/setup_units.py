@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import Any
 
+from osimlite.base.text import listed
+from osimlite.io.tables.headers import METRES
 from osimlite.lint.engine import WARNING, FindingSink, rule
 from osimlite.lint.placement import on_base
 from osimlite.lint.posture import marker_places, model_subject
@@ -15,8 +17,6 @@ from osimlite.lint.setup import Setup, members
 from osimlite.lint.table import Table
 from osimlite.schema.frames import Ground
 from osimlite.schema.tree import is_a
-from osimlite.tables import METRES
-from osimlite.text import listed
 
 _ALIKE = 0.3, 3.0
 """Between these, the size of a body that was measured over that of the model can be believed."""

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import combinations
 
+from osimlite.base.text import listed
 from osimlite.lint.config import Threshold
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.placement import Pose, default_poses, fixed, on_base
@@ -21,7 +22,6 @@ from osimlite.schema.joints import Joint
 from osimlite.schema.markers import Station
 from osimlite.schema.specs import FieldSpec, value_specs
 from osimlite.schema.tree import is_a
-from osimlite.text import listed
 
 POINTS = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point")
 """Sockets of a frame laid through stations."""

@@ -7,9 +7,10 @@ from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from osimlite.document.lexical import reads_as
-from osimlite.document.notes import Note
-from osimlite.document.source import Source
+from osimlite.base.text import counted, listed, nearest
+from osimlite.io.document.lexical import reads_as
+from osimlite.io.document.notes import Note
+from osimlite.io.document.source import Source
 from osimlite.lint.diagnostic import Fix, Severity
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import as_comment, renamed, without_element
@@ -22,7 +23,6 @@ from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.model import CURRENT_VERSION, Model
 from osimlite.schema.registry import classes_mentioning
 from osimlite.schema.specs import FieldSpec, field_specs
-from osimlite.text import counted, listed, nearest
 
 
 @rule("OSIM101", "unknown-tag", severity=ERROR, mends="both")

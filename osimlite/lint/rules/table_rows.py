@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 
-from osimlite.document.source import Position
+from osimlite.base.text import counted
+from osimlite.io.document.source import Position
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.table import Table
-from osimlite.text import counted
 
 
 @rule("OSIM805", "no-rows", severity=ERROR, about="table")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from math import nan
 
-from osimlite.document.source import Position
+from osimlite.base.text import counted, nearest
+from osimlite.io.document.source import Position
+from osimlite.io.tables.headers import COUNTS, MARKER_KEYS, SUFFIXES, Entry, MarkerHeader
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.table import Table
-from osimlite.tables import COUNTS, MARKER_KEYS, SUFFIXES, Entry, MarkerHeader
-from osimlite.text import counted, nearest
 
 _WHOLE = re.compile(r"\+?[0-9]+")
 _TO_THE_END = 1_000_000

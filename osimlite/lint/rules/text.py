@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from osimlite.document.source import Source
 from osimlite.errors import NotWellFormedError, VersionError
+from osimlite.io.document.source import Source
 from osimlite.lint.engine import ERROR, INFO, WARNING, FindingSink, rule
 from osimlite.lint.fixes import renamed
 from osimlite.lint.subject import Subject

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
+from osimlite.base.text import listed
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.skeleton import Link, Skeleton, growth, has_unknown_joints, skeleton
 from osimlite.lint.subject import Subject
@@ -13,7 +14,6 @@ from osimlite.schema.base import Component, Object
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.frames import Body
 from osimlite.schema.joints import FreeJoint, Joint, WeldJoint
-from osimlite.text import listed
 
 
 @rule("OSIM401", "unconnected-body", severity=ERROR)

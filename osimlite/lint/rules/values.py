@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from osimlite.document.lexical import Unclean, flag, reads_as, real, split, whole
-from osimlite.document.notes import Note
+from osimlite.base.text import listed, nearest
+from osimlite.io.document.lexical import Unclean, flag, reads_as, real, split, whole
+from osimlite.io.document.notes import Note
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
@@ -14,7 +15,6 @@ from osimlite.lint.words import called, shown
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Value
 from osimlite.schema.specs import FieldSpec, field_specs
-from osimlite.text import listed, nearest
 
 KEEPS_DEFAULT = "OpenSim keeps the default"
 """What a message says of a value that OpenSim cannot read, where it goes on."""

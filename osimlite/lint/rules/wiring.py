@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from osimlite.base.text import counted, nearest
 from osimlite.lint.engine import ERROR, FindingSink, rule
 from osimlite.lint.fixes import replaced
 from osimlite.lint.subject import Subject
@@ -14,7 +15,6 @@ from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
 from osimlite.schema.outputs import outputs_of
 from osimlite.schema.tree import Use, normalised
-from osimlite.text import counted, nearest
 
 
 @rule("OSIM331", "control-function-count", severity=ERROR)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 
-from osimlite.forces.vectors import Vector
+from osimlite.base.text import counted
 from osimlite.lint.engine import ERROR, WARNING, FindingSink, rule
 from osimlite.lint.placement import Pose, fixed, on_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import called
+from osimlite.mechanics.laws.vectors import Vector
 from osimlite.schema.base import Component
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint, PathWrap
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere
-from osimlite.text import counted
 
 
 def _wraps(path: GeometryPath) -> list[PathWrap]:

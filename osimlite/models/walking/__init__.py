@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from osimlite.document.printer import to_text
+from osimlite.base.files import make_folder, read_file, write_atomically
 from osimlite.errors import SettingError
-from osimlite.files import make_folder, read_file, write_atomically
+from osimlite.io.document.printer import to_text
 from osimlite.models.jumper import jumper
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import HuntCrossleyForce

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from osimlite.backends.symbols import casadi
-from osimlite.multibody.schema_functions import numeric
+from osimlite.derivatives.symbols import casadi
+from osimlite.mechanics.multibody.schema_functions import numeric
 from osimlite.optimal.bounds import Range
 from osimlite.optimal.point import Formula, Point, Rows
 from osimlite.optimal.problem import Problem

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.backends.symbols import casadi
+from osimlite.derivatives.symbols import casadi
 from osimlite.optimal.point import CONSTRAINT, Ends, Formula, Terms
 from osimlite.optimal.problem import Problem
 from osimlite.schema.moco.goals import MocoAverageSpeedGoal

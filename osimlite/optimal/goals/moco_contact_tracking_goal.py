@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.backends.symbols import casadi
+from osimlite.derivatives.symbols import casadi
 from osimlite.optimal.contacts import measured_groups, weight_of
 from osimlite.optimal.point import Formula, Point, Terms, integral
 from osimlite.optimal.problem import Problem

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from osimlite.backends.symbolic import on_symbols
-from osimlite.backends.symbols import Vector
+from osimlite.derivatives.symbolic import on_symbols
+from osimlite.derivatives.symbols import Vector
 from osimlite.errors import ModelError, SettingError
-from osimlite.kernels.programs import compute
-from osimlite.multibody.formula import Formula, program
+from osimlite.mechanics.kernels.programs import compute
+from osimlite.mechanics.multibody.formula import Formula, program
 from osimlite.optimal.point import Ends, Terms
 from osimlite.optimal.point import Formula as Value
 from osimlite.optimal.problem import Problem
 from osimlite.schema.moco.goals import MocoExpressionBasedParameterGoal
-from osimlite.sweep.properties import places
+from osimlite.simulation.properties import places
 
 
 def terms(goal: MocoExpressionBasedParameterGoal, problem: Problem) -> Terms:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.backends.symbols import casadi
+from osimlite.derivatives.symbols import casadi
 from osimlite.optimal.frames import Followed
 from osimlite.optimal.point import Formula, Frame, Point, Terms
 from osimlite.optimal.problem import Problem

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from osimlite.multibody.mechanism import GROUND
+from osimlite.base.text import did_you_mean
+from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.optimal.point import Formula, Point, Terms, integral
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.steps import along, contact_at, smooth
 from osimlite.schema.moco.goals import MocoStepTimeAsymmetryGoal, MocoStepTimeAsymmetryGoalGroup
-from osimlite.text import did_you_mean
 
 
 def terms(goal: MocoStepTimeAsymmetryGoal, problem: Problem) -> Terms:

@@ -3,7 +3,17 @@
 from typing import Annotated
 
 from osimlite.schema.base import Object, made, none
-from osimlite.schema.fields import Flag, Integer, Many, Optional, Reference, Unnamed, Value, Vec3, real
+from osimlite.schema.fields import (
+    Flag,
+    Integer,
+    Many,
+    Optional,
+    Reference,
+    Unnamed,
+    Value,
+    Vec3,
+    real,
+)
 from osimlite.schema.functions import Function
 from osimlite.schema.moco.goals import FramePath, Operation, OutputPath, SecondOutputPath
 from osimlite.schema.moco.parts import MocoConstraintInfo

@@ -4,7 +4,16 @@ from typing import Annotated
 
 from osimlite.schema.base import Object, made
 from osimlite.schema.controllers import ControllerSet
-from osimlite.schema.fields import LegacyFlag, LegacyInteger, LegacyNumber, LegacyUnnamed, Reals, Reference, real, reals
+from osimlite.schema.fields import (
+    LegacyFlag,
+    LegacyInteger,
+    LegacyNumber,
+    LegacyUnnamed,
+    Reals,
+    Reference,
+    real,
+    reals,
+)
 from osimlite.schema.references import (
     LegacyInputLoads,
     LegacyInputModel,

@@ -18,7 +18,14 @@ from osimlite.schema.fields import (
     vec3,
     word,
 )
-from osimlite.schema.references import InputModel, InputTable, OutputFolder, OutputTable, reads, writes
+from osimlite.schema.references import (
+    InputModel,
+    InputTable,
+    OutputFolder,
+    OutputTable,
+    reads,
+    writes,
+)
 from osimlite.schema.sets import Set
 
 

@@ -3,7 +3,18 @@
 from typing import Annotated
 
 from osimlite.schema.base import Object, made, none
-from osimlite.schema.fields import Flag, Integer, Many, Number, Reference, Single, Value, Vec2, real, word
+from osimlite.schema.fields import (
+    Flag,
+    Integer,
+    Many,
+    Number,
+    Reference,
+    Single,
+    Value,
+    Vec2,
+    real,
+    word,
+)
 from osimlite.schema.references import Named, OutputFolder
 from osimlite.schema.tools.processors import ModelProcessor, TableProcessor
 

@@ -3,7 +3,17 @@
 from typing import Annotated
 
 from osimlite.schema.base import Object, none
-from osimlite.schema.fields import Flag, LegacyMany, Many, Number, Optional, Reference, maybe, real, word
+from osimlite.schema.fields import (
+    Flag,
+    LegacyMany,
+    Many,
+    Number,
+    Optional,
+    Reference,
+    maybe,
+    real,
+    word,
+)
 from osimlite.schema.model import Model
 from osimlite.schema.paths import FunctionBasedPath
 from osimlite.schema.references import InputTable, Names, reads

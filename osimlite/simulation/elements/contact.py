@@ -7,14 +7,19 @@ from itertools import combinations
 from math import inf
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from osimlite.base.records import dataclass
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.forces.hunt_crossley import combine_materials, contact_energy
-from osimlite.forces.vectors import cross, minus, plus, vector
-from osimlite.kernels.layout import CONTACT_WORK, ITEM
-from osimlite.multibody.links import Places
-from osimlite.multibody.spatial import Array, offset
-from osimlite.records import dataclass
-from osimlite.schema.contact import ContactEllipsoid, ContactGeometry, ContactHalfSpace, ContactSphere
+from osimlite.mechanics.kernels.layout import CONTACT_WORK, ITEM
+from osimlite.mechanics.laws.hunt_crossley import combine_materials, contact_energy
+from osimlite.mechanics.laws.vectors import cross, minus, plus, vector
+from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.spatial import Array, offset
+from osimlite.schema.contact import (
+    ContactEllipsoid,
+    ContactGeometry,
+    ContactHalfSpace,
+    ContactSphere,
+)
 from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.tree import Use
@@ -71,7 +76,7 @@ class PairContact:
 
     Attributes:
         vt: transition velocity, m/s.
-        early_return: reproduce Simbody's defect, see `osimlite.forces.hunt_crossley.contact_forces`.
+        early_return: reproduce Simbody's defect, see `osimlite.mechanics.laws.hunt_crossley.contact_forces`.
         records: the surfaces in the order of OpenSim's record.
     """
 

@@ -8,12 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from osimlite.document.part import read_object
+from osimlite.base.records import dataclass
 from osimlite.errors import ModelError
-from osimlite.multibody.functions import Constant, Function, PiecewiseConstant
-from osimlite.multibody.smoothing_spline import PiecewisePolynomial
-from osimlite.records import dataclass
-from osimlite.schema.control_sets import Control, ControlConstant, ControlLinear, ControlLinearNode, ControlSet
+from osimlite.io.document.part import read_object
+from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseConstant
+from osimlite.mechanics.multibody.smoothing_spline import PiecewisePolynomial
+from osimlite.schema.control_sets import (
+    Control,
+    ControlConstant,
+    ControlLinear,
+    ControlLinearNode,
+    ControlSet,
+)
 from osimlite.simulation.elements.control_tables import read_controls
 
 

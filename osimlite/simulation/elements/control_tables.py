@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.errors import ModelError
-from osimlite.multibody.functions import Function, PiecewiseConstant
-from osimlite.multibody.smoothing_spline import smoothing_spline
-from osimlite.simulation.files.storage import StoTable
-from osimlite.simulation.files.table_stream import TableStream, start_of_word
+from osimlite.io.tables.storage import StoTable
+from osimlite.io.tables.table_stream import TableStream, start_of_word
+from osimlite.mechanics.multibody.functions import Function, PiecewiseConstant
+from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
 
 
 def read_controls(path: str | Path) -> StoTable:

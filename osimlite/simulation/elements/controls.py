@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from osimlite.base.records import dataclass, replace
 from osimlite.errors import UnsupportedError
-from osimlite.kernels.layout import ITEM, WORK
-from osimlite.multibody.function_tables import table_of_one
-from osimlite.multibody.functions import Function
-from osimlite.records import dataclass, replace
+from osimlite.mechanics.kernels.layout import ITEM, WORK
+from osimlite.mechanics.multibody.function_tables import table_of_one
+from osimlite.mechanics.multibody.functions import Function
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Unknown
 from osimlite.schema.controller_types import ControlSetController, TrackingController

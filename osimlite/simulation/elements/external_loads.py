@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from osimlite.document.kept import while_unchanged
-from osimlite.document.part import read_object
+from osimlite.base.text import listed, nearest
 from osimlite.errors import DocumentError, ModelError, SettingError
-from osimlite.multibody.functions import Constant, Function, PiecewiseLinear
-from osimlite.multibody.mechanism import FramePlacement, Mechanism
-from osimlite.multibody.smoothing_spline import natural_splines
-from osimlite.multibody.spatial import Array
+from osimlite.io.document.kept import while_unchanged
+from osimlite.io.document.part import read_object
+from osimlite.io.tables.c3d import ENDING, read_c3d_forces
+from osimlite.io.tables.storage import StoTable, beside, read_sto
+from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseLinear
+from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism
+from osimlite.mechanics.multibody.smoothing_spline import natural_splines
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.prescribed import ExternalForce, ExternalLoads
 from osimlite.simulation.elements.geometries.load import Load
 from osimlite.simulation.elements.kind import DeclaredForce
-from osimlite.simulation.files.c3d import ENDING, read_c3d_forces
-from osimlite.simulation.files.storage import StoTable, beside, read_sto
-from osimlite.text import listed, nearest
 
 if TYPE_CHECKING:
     from osimlite.simulation.elements.gather import ElementBuilder

@@ -12,17 +12,17 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from osimlite.base.records import dataclass
 from osimlite.errors import ModelError
-from osimlite.forces.elastic_foundation import spring_load
-from osimlite.forces.vectors import ZERO, Vector, minus, plus, times
-from osimlite.kernels.layout import ITEM, LINK_WORK, MODEL
-from osimlite.kernels.meshes import MESH_WORK, load_mesh
-from osimlite.kernels.pointers import Floats, Ints
-from osimlite.kernels.points import angular_velocity, station, velocity
-from osimlite.multibody.links import Placement, Places
-from osimlite.multibody.mechanism import GROUND
-from osimlite.multibody.spatial import Array, transform
-from osimlite.records import dataclass
+from osimlite.mechanics.kernels.layout import ITEM, LINK_WORK, MODEL
+from osimlite.mechanics.kernels.meshes import MESH_WORK, load_mesh
+from osimlite.mechanics.kernels.pointers import Floats, Ints
+from osimlite.mechanics.kernels.points import angular_velocity, station, velocity
+from osimlite.mechanics.laws.elastic_foundation import spring_load
+from osimlite.mechanics.laws.vectors import ZERO, Vector, minus, plus, times
+from osimlite.mechanics.multibody.links import Placement, Places
+from osimlite.mechanics.multibody.mechanism import GROUND
+from osimlite.mechanics.multibody.spatial import Array, transform
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.contact_forces import ElasticFoundationForce
 from osimlite.simulation.elements.contact import (

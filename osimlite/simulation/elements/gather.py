@@ -12,20 +12,20 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from osimlite._load import module_name
+from osimlite.base.load import module_name
+from osimlite.base.records import dataclass
+from osimlite.base.text import listed, or_known
 from osimlite.errors import ModelError, SettingError, UnsupportedError
-from osimlite.multibody.functions import Function
-from osimlite.multibody.mechanism import FramePlacement, Mechanism
-from osimlite.multibody.schema_functions import numeric
-from osimlite.records import dataclass
+from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism
+from osimlite.mechanics.multibody.schema_functions import numeric
 from osimlite.schema.base import Unknown
 from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.controls import NO_CONTROLS, Controls, Drive, ModelControls
-from osimlite.text import listed, or_known
 
 if TYPE_CHECKING:
-    from osimlite.meshes.folders import MeshFolders
+    from osimlite.io.meshes.folders import MeshFolders
     from osimlite.schema.prescribed import ExternalLoads
     from osimlite.simulation.elements.items import ForceElement
 
@@ -171,7 +171,7 @@ class ElementBuilder:
     @property
     def mesh_folders(self) -> MeshFolders:
         """Where mesh files may be."""
-        from osimlite.meshes.folders import MeshFolders
+        from osimlite.io.meshes.folders import MeshFolders
 
         return MeshFolders(self.folder)
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from osimlite.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import Function
 
 
 def value_of(function: Function, argument: float) -> float:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
-from osimlite.multibody.links import Places
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.multibody.links import Places
 from osimlite.simulation.states import StateVariable
 
 

@@ -7,12 +7,19 @@ from functools import cached_property
 from inspect import signature
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from osimlite.forces.carried import carrying, carrying_room, slope_of
-from osimlite.kernels.condensation import WIDTH
-from osimlite.kernels.curves_abreast import LANES, answer, ask, ask_sum, missed_of, value_of
-from osimlite.kernels.layout import ITEM
-from osimlite.kernels.written import GIVEN, written
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.kernels.condensation import WIDTH
+from osimlite.mechanics.kernels.curves_abreast import (
+    LANES,
+    answer,
+    ask,
+    ask_sum,
+    missed_of,
+    value_of,
+)
+from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.kernels.written import GIVEN, written
+from osimlite.mechanics.laws.carried import carrying, carrying_room, slope_of
 from osimlite.simulation.elements.laws import ABREAST, EQUILIBRIUM, OFF, RESPONSE, RIGID
 
 if TYPE_CHECKING:
@@ -99,7 +106,7 @@ class KernelText:
     def response_kernel(self) -> Callable[..., int]:
         """The function that applies 1 of a force along a displacement, and leaves its derivatives in SCRATCH.
 
-        A row for the force and for the rate of each state, see :mod:`osimlite.kernels.condensation`. The moment is that
+        A row for the force and for the rate of each state, see :mod:`osimlite.mechanics.kernels.condensation`. The moment is that
         of the last evaluation, whose record tells what that has found.
         """
         kind, force = self.kind, self.kind.geometry.along[0]

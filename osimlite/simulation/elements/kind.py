@@ -19,10 +19,10 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, ClassVar
 
-from osimlite._load import module_name
-from osimlite.kernels.layout import ITEM
-from osimlite.multibody.links import Places
-from osimlite.records import dataclass, field
+from osimlite.base.load import module_name
+from osimlite.base.records import dataclass, field
+from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.multibody.links import Places
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.states import states_of
 from osimlite.schema.tree import is_a
@@ -31,7 +31,14 @@ from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item, Response, Silent
 from osimlite.simulation.elements.kernel_text import SOLVED, Abreast, KernelText
 from osimlite.simulation.elements.laws import ABREAST, EQUILIBRIUM, OFF, RESPONSE, RIGID
-from osimlite.simulation.elements.parameters import Control, Fields, Number, Parameter, ReflexControl, Tail
+from osimlite.simulation.elements.parameters import (
+    Control,
+    Fields,
+    Number,
+    Parameter,
+    ReflexControl,
+    Tail,
+)
 from osimlite.simulation.states import StateVariable
 
 ENERGY = "energy"

@@ -13,7 +13,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any
 
-from osimlite.kernels.table import LAW_MODULES, own_function
+from osimlite.mechanics.kernels.table import LAW_MODULES, own_function
 
 EQUILIBRIUM, OFF, RESPONSE, RIGID, ABREAST = "_equilibrium", "_off", "_response", "_rigid", "_abreast"
 FORMS = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from osimlite.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import Function
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.probe import Reading, Subject
 

@@ -7,7 +7,7 @@ from math import pi, sin
 from typing import Any
 
 from osimlite.errors import ModelError
-from osimlite.forces.muscles import SIGNIFICANT, MuscleInputs
+from osimlite.mechanics.laws.muscles import SIGNIFICANT, MuscleInputs
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.kind import Kind

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from math import nan
 from typing import Any
 
-from osimlite.forces.muscles import MuscleInputs
-from osimlite.forces.old_muscles import (
+from osimlite.mechanics.laws.muscles import MuscleInputs
+from osimlite.mechanics.laws.old_muscles import (
     ROUNDS,
     TOLERANCE,
     OldMuscle,

@@ -6,12 +6,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from osimlite.base.records import dataclass
 from osimlite.errors import ModelError
-from osimlite.kernels.controls import with_reflex
-from osimlite.multibody.formula import Formula, program
-from osimlite.multibody.function_tables import table_of_one
-from osimlite.multibody.functions import Function
-from osimlite.records import dataclass
+from osimlite.mechanics.kernels.controls import with_reflex
+from osimlite.mechanics.multibody.formula import Formula, program
+from osimlite.mechanics.multibody.function_tables import table_of_one
+from osimlite.mechanics.multibody.functions import Function
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kernel_text import arguments_of
 

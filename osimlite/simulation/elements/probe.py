@@ -16,20 +16,20 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache, cached_property
 from typing import Any, NamedTuple
 
-from osimlite._load import module_name
+from osimlite.base.load import module_name
+from osimlite.base.quantity import tell
+from osimlite.base.records import dataclass
+from osimlite.base.text import did_you_mean
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.kernels.layout import ITEM
-from osimlite.kernels.written import GIVEN, written
-from osimlite.multibody.function_tables import table_of_one
-from osimlite.multibody.functions import Function
-from osimlite.multibody.links import Places
-from osimlite.quantity import tell
-from osimlite.records import dataclass
+from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.kernels.written import GIVEN, written
+from osimlite.mechanics.multibody.function_tables import table_of_one
+from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.links import Places
 from osimlite.simulation.elements.gather import ElementBuilder, module_of
 from osimlite.simulation.elements.items import CONTROLS, ForceElement, Item, Silent
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.states import StateVariable
-from osimlite.text import did_you_mean
 
 HEAD = ITEM.OWN + 5
 """Offset of the integers that tell what a probe reads, after those of its own."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from osimlite.base.records import dataclass
+from osimlite.base.text import did_you_mean
 from osimlite.errors import ModelError
-from osimlite.multibody.functions import Function, PiecewiseLinear
-from osimlite.records import dataclass
+from osimlite.io.tables.storage import beside
+from osimlite.mechanics.multibody.functions import Function, PiecewiseLinear
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation.elements.control_tables import read_controls
 from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.files.storage import beside
-from osimlite.text import did_you_mean
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from osimlite.forces.smooth_muscles import SmoothMuscle
+from osimlite.mechanics.laws.smooth_muscles import SmoothMuscle
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kind import State
 from osimlite.simulation.elements.muscle import PENNATION, height

@@ -8,15 +8,15 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from osimlite.base.files import read_file
+from osimlite.base.records import dataclass
 from osimlite.errors import ModelError
-from osimlite.files import read_file
-from osimlite.meshes.folders import MeshFolders
-from osimlite.meshes.obj import obj_polygons
-from osimlite.meshes.stl import stl_corners
-from osimlite.meshes.surface import Indices, Polygons
-from osimlite.meshes.vtp import vtp_polygons
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.io.meshes.folders import MeshFolders
+from osimlite.io.meshes.obj import obj_polygons
+from osimlite.io.meshes.stl import stl_corners
+from osimlite.io.meshes.surface import Indices, Polygons
+from osimlite.io.meshes.vtp import vtp_polygons
+from osimlite.mechanics.multibody.spatial import Array
 
 _SAME_POINT = 8.7e-7
 """STL files have no common points; corners nearer than this in every direction are one, as for Simbody (m)."""

@@ -6,9 +6,9 @@ import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from osimlite._require import require
+from osimlite.base.require import require
+from osimlite.base.text import or_known
 from osimlite.errors import DeprecatedWarning, OsimliteError
-from osimlite.text import or_known
 
 if TYPE_CHECKING:
     from osimlite.simulation.engines.protocol import EngineFactory

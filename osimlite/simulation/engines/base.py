@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import inf
 from typing import Self
 
-from osimlite.kernels.layout import MODEL, OUTCOME, STAGE, WORK
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.euler import SemiImplicitEuler

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite import kernels
-from osimlite.kernels import record
-from osimlite.kernels.condensation import condensation_room
-from osimlite.kernels.layout import MODEL
-from osimlite.kernels.method import ERRORS
-from osimlite.kernels.pointers import Floats, Ints
-from osimlite.kernels.table import LAW_MODULES
+from osimlite.mechanics import kernels
+from osimlite.mechanics.kernels import record
+from osimlite.mechanics.kernels.condensation import condensation_room
+from osimlite.mechanics.kernels.layout import MODEL
+from osimlite.mechanics.kernels.method import ERRORS
+from osimlite.mechanics.kernels.pointers import Floats, Ints
+from osimlite.mechanics.kernels.table import LAW_MODULES
 from osimlite.simulation.integrators import INITIAL_STEP
 from osimlite.simulation.many import BatchOptions
 
@@ -43,7 +43,7 @@ class Batch:
 
     Attributes:
         clocks: time and next step of each run, s (W, 2).
-        counts: see :mod:`osimlite.kernels.record` (W, 6).
+        counts: see :mod:`osimlite.mechanics.kernels.record` (W, 6).
         states: at the end (W, y).
         endings: of the runs (W,).
         reports: states at the times (W, r, y), not a number after the end of a run.
@@ -114,7 +114,7 @@ class Batch:
         self._call(law, vectors, room, each, *own, *parts, first, len(self.states) if last is None else last)
 
     def hold(self, law: str, room: Floats, numbers: Floats, *parts: Any) -> int:
-        """Compute by a law of :mod:`osimlite.kernels.walks`, with what it takes besides.
+        """Compute by a law of :mod:`osimlite.mechanics.kernels.walks`, with what it takes besides.
 
         Args:
             law: its name.

@@ -13,7 +13,14 @@ from functools import cache
 from types import FunctionType
 from typing import Any
 
-from osimlite.forces.carried import carrying, carrying_room, is_nothing, plain, settled, slope_of
+from osimlite.mechanics.laws.carried import (
+    carrying,
+    carrying_room,
+    is_nothing,
+    plain,
+    settled,
+    slope_of,
+)
 
 # Where a slope has no end, at the edge of what a function is defined for, it counts as 0.
 SLOPES: dict[Any, tuple[Callable[..., float], ...]] = {

@@ -1,6 +1,6 @@
 """The compiled engine: accelerations, steps and events in machine code.
 
-What is compiled are the functions of :mod:`osimlite.kernels` with the force laws and the step control that
+What is compiled are the functions of :mod:`osimlite.mechanics.kernels` with the force laws and the step control that
 they call. The code serves every model: models and parameters are arrays.
 """
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from osimlite.errors import OsimliteError, SimulationError
-from osimlite.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.gather import OPENSIM

@@ -18,13 +18,18 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from osimlite._cores import cores
-from osimlite.codegen import cplusplus, reader
-from osimlite.codegen.processor import machine_name, processor_features
-from osimlite.codegen.reader import TranslationError
-from osimlite.codegen.sources import compute_digest
-from osimlite.codegen.toolchain import NATIVE, CompilationError, find_compiler, library_suffix
+from osimlite.base.cores import cores
 from osimlite.errors import OsimliteError
+from osimlite.mechanics.codegen import cplusplus, reader
+from osimlite.mechanics.codegen.processor import machine_name, processor_features
+from osimlite.mechanics.codegen.reader import TranslationError
+from osimlite.mechanics.codegen.sources import compute_digest
+from osimlite.mechanics.codegen.toolchain import (
+    NATIVE,
+    CompilationError,
+    find_compiler,
+    library_suffix,
+)
 from osimlite.simulation.elements.laws import law_of, symbol_of
 from osimlite.simulation.engines.private_files import read_private, write_private
 
@@ -177,7 +182,7 @@ def cache_folders() -> Iterator[Path]:
     if os.environ.get(FOLDER):
         yield Path(os.environ[FOLDER])
         return
-    yield Path(__file__).parents[2] / "kernels" / "__pycache__"
+    yield Path(__file__).parents[2] / "mechanics" / "kernels" / "__pycache__"
     home: str | Path | None = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
     # A relative path would lead into whatever folder the program is started in.
     if not home or not os.path.isabs(home):

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from weakref import WeakKeyDictionary
 
 from osimlite.errors import SettingError, SimulationError
-from osimlite.kernels import record
-from osimlite.kernels.layout import MODEL
-from osimlite.kernels.pointers import Floats
-from osimlite.kernels.states import cubic
-from osimlite.kernels.step_sizes import shortest_step, weight
+from osimlite.mechanics.kernels import record
+from osimlite.mechanics.kernels.layout import MODEL
+from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.kernels.states import cubic
+from osimlite.mechanics.kernels.step_sizes import shortest_step, weight
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.integrators import (
     DEFAULT_ACCURACY,
@@ -46,10 +46,10 @@ class ControlledSteps(Stepper):
     Merson's method propagates a fourth-order solution and estimates its error from an embedded third-order one
     (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, table 4.1). A step is taken
     if the norm of the error is at most `accuracy`, and repeated smaller if not. With the same derivatives, the steps
-    are OpenSim's to the last bit. The kernels take them (:mod:`osimlite.kernels.runs`), many in one call
+    are OpenSim's to the last bit. The kernels take them (:mod:`osimlite.mechanics.kernels.runs`), many in one call
     where a table of states is asked for.
 
-    The methods for stiff motion, :mod:`osimlite.kernels.multistep` and `rosenbrock`, keep the same norm of
+    The methods for stiff motion, :mod:`osimlite.mechanics.kernels.multistep` and `rosenbrock`, keep the same norm of
     the error that they estimate below `accuracy`.
 
     Args:

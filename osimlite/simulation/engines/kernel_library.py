@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
-from osimlite.codegen.processor import processor_features, supports_v3
-from osimlite.codegen.sources import compute_digest
-from osimlite.codegen.toolchain import BASELINE, NATIVE, X86_64_V3, library_suffix
+from osimlite.mechanics.codegen.processor import processor_features, supports_v3
+from osimlite.mechanics.codegen.sources import compute_digest
+from osimlite.mechanics.codegen.toolchain import BASELINE, NATIVE, X86_64_V3, library_suffix
 from osimlite.simulation.elements.laws import law_of, symbol_of
 
 PACKAGE = Path(__file__).parents[2]
@@ -78,7 +78,7 @@ class KernelLibrary:
         """Return whether a law is what it was when the library was compiled."""
         if not self.changed_files:
             return True
-        if any(file.startswith("codegen/") for file in self.changed_files):
+        if any(file.startswith("mechanics/codegen/") for file in self.changed_files):
             # Another translation of the same law.
             return False
         return compute_digest(law_of(name)[0]) == digest

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.codegen.toolchain import CompilationError
-from osimlite.kernels import pointers
-from osimlite.kernels.layout import MODEL, OUTCOME
-from osimlite.kernels.pointers import Ints
-from osimlite.kernels.table import LAW_NUMBERS
+from osimlite.mechanics.codegen.toolchain import CompilationError
+from osimlite.mechanics.kernels import pointers
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME
+from osimlite.mechanics.kernels.pointers import Ints
+from osimlite.mechanics.kernels.table import LAW_NUMBERS
 from osimlite.simulation.elements.laws import ALONG, RESPONSE, law_function
 from osimlite.simulation.engines import machine_code
 from osimlite.simulation.engines.carrying import DualVector, carried_by

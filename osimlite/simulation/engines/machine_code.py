@@ -11,11 +11,11 @@ import os
 import platform
 from collections.abc import Iterable, Sequence
 
-from osimlite.codegen.toolchain import CompilationError, find_compiler
+from osimlite.base.text import or_known
 from osimlite.errors import OsimliteError
+from osimlite.mechanics.codegen.toolchain import CompilationError, find_compiler
 from osimlite.simulation.elements.laws import law_of
 from osimlite.simulation.engines import kernel_library
-from osimlite.text import or_known
 
 VARIABLE = "OSIMLITE_KERNELS"
 """Environment variable that names the only source of machine code."""

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite._cores import cores
+from osimlite.base.cores import cores
+from osimlite.base.text import did_you_mean
 from osimlite.errors import OsimliteError
-from osimlite.kernels import record
-from osimlite.kernels.contacts import RADIUS
-from osimlite.kernels.layout import ITEM, MODEL
-from osimlite.kernels.pointers import Floats, Ints
+from osimlite.mechanics.kernels import record
+from osimlite.mechanics.kernels.contacts import RADIUS
+from osimlite.mechanics.kernels.layout import ITEM, MODEL
+from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.many import BatchOptions
 from osimlite.simulation.runs import Runs, Watch
-from osimlite.text import did_you_mean
 
 if TYPE_CHECKING:
     from osimlite.simulation.engines.compiled import CompiledEngine

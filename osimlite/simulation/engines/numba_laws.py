@@ -13,11 +13,11 @@ from inspect import signature
 from types import FunctionType, ModuleType
 from typing import Any
 
-from osimlite._require import require
-from osimlite.codegen.sources import compute_digest
-from osimlite.codegen.toolchain import CompilationError
-from osimlite.kernels import pointers
-from osimlite.kernels.layout import Record
+from osimlite.base.require import require
+from osimlite.mechanics.codegen.sources import compute_digest
+from osimlite.mechanics.codegen.toolchain import CompilationError
+from osimlite.mechanics.kernels import pointers
+from osimlite.mechanics.kernels.layout import Record
 from osimlite.simulation.elements.laws import law_of
 
 _entries: dict[str, Any] = {}

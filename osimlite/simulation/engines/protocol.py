@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Protocol
 
-from osimlite.kernels.pointers import Floats
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.probe import DeclaredProbe
@@ -20,8 +20,8 @@ from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import Observer, Stepper
 
 if TYPE_CHECKING:
-    from osimlite.robot.visuals import Visuals
     from osimlite.simulation.held import HeldRuns
+    from osimlite.simulation.robot.visuals import Visuals
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from osimlite.kernels.layout import ITEM, MODEL
-from osimlite.kernels.pointers import Floats
-from osimlite.multibody.build import mass_properties
-from osimlite.multibody.constraints import Lock
-from osimlite.multibody.links import Places
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.records import replace
+from osimlite.base.records import replace
+from osimlite.mechanics.kernels.layout import ITEM, MODEL
+from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.multibody.build import mass_properties
+from osimlite.mechanics.multibody.constraints import Lock
+from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.base import Component
 from osimlite.schema.controllers import Controller
 from osimlite.schema.forces import Force

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from osimlite.io.tables.old_storage import UNITS
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.tools.analyses import Actuation
-from osimlite.simulation.files.old_storage import UNITS
 from osimlite.tools.motion import Motion, Tables
 
 _DESCRIPTION = (

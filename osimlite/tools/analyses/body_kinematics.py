@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.multibody.spatial import angles_xyz
+from osimlite.io.tables.old_storage import DEGREES
+from osimlite.mechanics.multibody.spatial import angles_xyz
 from osimlite.schema.tools.analyses import BodyKinematics
-from osimlite.simulation.files.old_storage import DEGREES
 from osimlite.tools.motion import Motion, Tables
 
 WHOLE = "center_of_mass"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array
+from osimlite.io.tables.old_storage import UNITS
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.tools.analyses import ForceReporter
-from osimlite.simulation.files.old_storage import UNITS
 from osimlite.simulation.force_labels import label_as_opensim
 from osimlite.simulation.system import System
 from osimlite.tools.constraint_forces import recorded

@@ -6,17 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.multibody.schema_frames import Placements
-from osimlite.multibody.spatial import Array
+from osimlite.base.text import counted, did_you_mean, listed
+from osimlite.io.tables.storage import read_sto
+from osimlite.mechanics.multibody.schema_frames import Placements
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.actuators import ScalarActuator
 from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
 from osimlite.schema.tools.analyses import JointReaction
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.files.storage import read_sto
 from osimlite.simulation.given_controls import driven
 from osimlite.simulation.static_optimization import ideal
-from osimlite.text import counted, did_you_mean, listed
 from osimlite.tools.joint_wrenches import JointWrenches
 from osimlite.tools.motion import Motion, Tables
 from osimlite.tools.through_time import simulation_of

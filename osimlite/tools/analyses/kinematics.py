@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from osimlite.io.tables.old_storage import UNITS
 from osimlite.schema.tools.analyses import Kinematics
-from osimlite.simulation.files.old_storage import UNITS
 from osimlite.tools.motion import Motion, Tables
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array
+from osimlite.io.tables.old_storage import UNITS
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.tools.analyses import MuscleAnalysis
 from osimlite.simulation.elements.muscle import SPRING
-from osimlite.simulation.files.old_storage import UNITS
 from osimlite.simulation.paths import Paths
 from osimlite.tools.motion import Motion, Tables
 from osimlite.tools.muscle_quantities import CHECKED, KNOWN, OF_DYNAMICS, quantities

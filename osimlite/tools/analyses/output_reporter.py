@@ -6,10 +6,10 @@ import re
 
 import numpy as np
 
+from osimlite.base.text import did_you_mean, listed
 from osimlite.schema.base import Component
 from osimlite.schema.outputs import outputs_of
 from osimlite.schema.tools.analyses import OutputReporter
-from osimlite.text import did_you_mean, listed
 from osimlite.tools.motion import Motion, Tables
 from osimlite.tools.outputs import reader_of
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array
+from osimlite.io.tables.old_storage import DEGREES
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.probes import Probe
 from osimlite.schema.tools.analyses import ProbeReporter
-from osimlite.simulation.files.old_storage import DEGREES
 from osimlite.simulation.probed import probe_labels, probe_rows
 from osimlite.tools.motion import Motion, Tables
 

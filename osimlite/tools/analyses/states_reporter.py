@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from osimlite.io.tables.old_storage import UNITS
 from osimlite.schema.tools.analyses import StatesReporter
-from osimlite.simulation.files.old_storage import UNITS
 from osimlite.tools.motion import Motion, Tables
 
 _DESCRIPTION = f"\nThis file contains the states of a model during a simulation.\n\n{UNITS}"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from osimlite.io.tables.control_nodes import control_set
 from osimlite.schema.tools.analyses import StaticOptimization
-from osimlite.simulation.files.control_nodes import control_set
 from osimlite.simulation.static_optimization import Shared
 from osimlite.tools.analyses.force_reporter import DESCRIPTION
 from osimlite.tools.motion import Motion, Tables

@@ -8,11 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from osimlite.io.tables.storage import StoTable
 from osimlite.lint.trial import Number
-from osimlite.multibody.spatial import Array
-from osimlite.schema.actuators import BodyActuator, CoordinateActuator, PointActuator, TorqueActuator
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.actuators import (
+    BodyActuator,
+    CoordinateActuator,
+    PointActuator,
+    TorqueActuator,
+)
 from osimlite.schema.muscles import Muscle
-from osimlite.simulation.files.storage import StoTable
 from osimlite.simulation.paths import Paths
 from osimlite.simulation.recorded import inverse_dynamics
 from osimlite.tools.evidence import root_of

@@ -7,16 +7,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from osimlite.document.source import Source
+from osimlite.base.records import dataclass, field
+from osimlite.base.text import listed
 from osimlite.errors import OsimliteError
+from osimlite.io.document.source import Source
 from osimlite.lint.config import Config, checked_words
 from osimlite.lint.diagnostic import Finding, Report
 from osimlite.lint.engine import run, subject_of
 from osimlite.lint.many import Texts, settings_of
 from osimlite.lint.trial import Number, Trial, Verdict
-from osimlite.multibody.extremes import any_numbers
-from osimlite.records import dataclass, field
-from osimlite.text import listed
+from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.tools.trials.actuators import (
     activation_numbers,
     actuators_of,

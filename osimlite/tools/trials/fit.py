@@ -16,12 +16,12 @@ from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.pose_fit import PoseFit
 from osimlite.fitting.pose_layout import Marker
 from osimlite.fitting.scale_tool import run_scale
+from osimlite.io.tables.times import both_of
 from osimlite.lint.trial import Number
-from osimlite.multibody.parts import CoordinateInfo
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.parts import CoordinateInfo
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.tools.inverse_kinematics import IKMarkerTask
-from osimlite.simulation.files.recorded import RecordedMotion
-from osimlite.simulation.files.times import both_of
+from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.tools.evidence import root_of
 from osimlite.tools.job import NONE
 from osimlite.tools.trials.folder import MOTIONS, Folder, Missing, Tool

@@ -10,22 +10,22 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from osimlite.document.kept import top_at
-from osimlite.document.part import read_object
-from osimlite.document.reader import read_any
-from osimlite.document.source import Position, Source
+from osimlite.base.files import no_such
+from osimlite.base.records import replace
 from osimlite.errors import OsimliteError
-from osimlite.files import no_such
+from osimlite.io.document.kept import top_at
+from osimlite.io.document.part import read_object
+from osimlite.io.document.reader import read_any
+from osimlite.io.document.source import Position, Source
+from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.lint.suffixes import begins_as_ours
 from osimlite.lint.table import Table
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.records import replace
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.forces import Force, ForceSet
 from osimlite.schema.model import Model
 from osimlite.schema.prescribed import ExternalLoads
-from osimlite.simulation.files.recorded import RecordedMotion
-from osimlite.simulation.files.storage import StoTable, read_sto
+from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.tools.job import NONE, Job
 
 T = TypeVar("T")

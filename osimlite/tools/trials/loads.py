@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite.errors import OsimliteError
+from osimlite.io.tables.storage import StoTable
 from osimlite.lint.config import Config
 from osimlite.lint.engine import subject_of
 from osimlite.lint.setup import Setup, members
 from osimlite.lint.trial import Number
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.prescribed import ExternalForce
-from osimlite.simulation.files.recorded import RecordedMotion
-from osimlite.simulation.files.storage import StoTable
+from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.tools.evidence import ON_GROUND, side_of
 from osimlite.tools.trials.fit import Numbers
 from osimlite.tools.trials.folder import LOADS, Missing, Tool

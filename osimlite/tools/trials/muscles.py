@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from osimlite.io.tables.storage import StoTable
 from osimlite.lint.trial import Number
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.tools.analyses import MuscleAnalysis
 from osimlite.schema.tools.dynamics import AnalyzeTool
-from osimlite.simulation.files.storage import StoTable
 from osimlite.tools import analyze_tool
 from osimlite.tools.job import Job
 from osimlite.tools.outcome import Outcome

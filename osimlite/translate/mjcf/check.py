@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
-from osimlite._require import require
+from osimlite.base.records import dataclass
+from osimlite.base.require import require
+from osimlite.base.text import json_lines
 from osimlite.errors import ModelError, OsimliteError
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
-from osimlite.robot.names import joint_names
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.paths import Paths
-from osimlite.text import json_lines
+from osimlite.simulation.robot.names import joint_names
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.isometric import isometric_tension
 from osimlite.translate.mjcf.muscles import Curves

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.multibody import body_constraints as b
+from osimlite.mechanics.multibody import body_constraints as b
 from osimlite.translate.fidelity import LEFT_OUT
 from osimlite.translate.mjcf.draft import SPECK, Draft, add
 from osimlite.translate.mjcf.frame_forces import straight

@@ -8,12 +8,18 @@ from itertools import combinations
 import numpy as np
 
 from osimlite.errors import ModelError
-from osimlite.multibody.spatial import Array, offset
-from osimlite.robot.visuals import mesh_shape
-from osimlite.schema.contact import ContactEllipsoid, ContactGeometry, ContactHalfSpace, ContactMesh, ContactSphere
+from osimlite.mechanics.multibody.spatial import Array, offset
+from osimlite.schema.contact import (
+    ContactEllipsoid,
+    ContactGeometry,
+    ContactHalfSpace,
+    ContactMesh,
+    ContactSphere,
+)
 from osimlite.schema.contact_forces import ElasticFoundationForce, SmoothSphereHalfSpaceForce
 from osimlite.schema.forces import Force, HuntCrossleyForce
 from osimlite.schema.tree import Use
+from osimlite.simulation.robot.visuals import mesh_shape
 from osimlite.translate.collisions import SLAB
 from osimlite.translate.fidelity import LEFT_OUT
 from osimlite.translate.mjcf.draft import Draft, Unsayable, Value, add, pose

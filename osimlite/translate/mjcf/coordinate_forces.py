@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from osimlite.forces.coordinate_limit import limit_force
+from osimlite.mechanics.laws.coordinate_limit import limit_force
 from osimlite.schema.actuators import ActivationCoordinateActuator, CoordinateActuator
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.path_actuators import PathActuator

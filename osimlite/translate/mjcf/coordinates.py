@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from osimlite.multibody.functions import Linear
-from osimlite.robot.drivers import Composed
+from osimlite.mechanics.multibody.functions import Linear
 from osimlite.schema.joints import Joint
+from osimlite.simulation.robot.drivers import Composed
 from osimlite.translate.mjcf.draft import Draft, Follower
 
 

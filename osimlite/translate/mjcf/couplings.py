@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from osimlite.multibody.functions import IDENTITY, Linear
-from osimlite.multibody.mechanism import GROUND
-from osimlite.multibody.spatial import Array
-from osimlite.robot.drivers import Composed, Driver, coordinate_drivers, joint_driver
-from osimlite.robot.lines import Line
-from osimlite.robot.mimics import couplers, leaders
-from osimlite.robot.names import joint_names
-from osimlite.robot.robot import RobotJoint
+from osimlite.mechanics.multibody.functions import IDENTITY, Linear
+from osimlite.mechanics.multibody.mechanism import GROUND
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.simulation.robot.drivers import Composed, Driver, coordinate_drivers, joint_driver
+from osimlite.simulation.robot.lines import Line
+from osimlite.simulation.robot.mimics import couplers, leaders
+from osimlite.simulation.robot.names import joint_names
+from osimlite.simulation.robot.robot import RobotJoint
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.bodies import LEAST_MASS
 from osimlite.translate.mjcf.draft import SPECK, Draft, Follower, Lead, add

@@ -10,20 +10,25 @@ from typing import Literal, NamedTuple, TypeVar
 import numpy as np
 from lxml.etree import Element, SubElement, _Element
 
+from osimlite.base.records import dataclass, field
+from osimlite.base.text import unused
 from osimlite.errors import ModelError, SimulationError, UnsupportedError
-from osimlite.multibody.functions import Function
-from osimlite.multibody.mechanism import GROUND, FramePlacement, Mechanism, StationPlacement
-from osimlite.multibody.spatial import Array, quaternion
-from osimlite.records import dataclass, field
-from osimlite.robot.lines import Line
-from osimlite.robot.mesh_files import MeshFiles
-from osimlite.robot.names import dotted, joint_names, xml_name
-from osimlite.robot.robot import Link, Robot
-from osimlite.robot.urdf import number, numbers
+from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.mechanism import (
+    GROUND,
+    FramePlacement,
+    Mechanism,
+    StationPlacement,
+)
+from osimlite.mechanics.multibody.spatial import Array, quaternion
 from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree
-from osimlite.text import unused
+from osimlite.simulation.robot.lines import Line
+from osimlite.simulation.robot.mesh_files import MeshFiles
+from osimlite.simulation.robot.names import dotted, joint_names, xml_name
+from osimlite.simulation.robot.robot import Link, Robot
+from osimlite.simulation.robot.urdf import number, numbers
 from osimlite.translate.fidelity import Fidelity
 
 Version = Literal[3, 4]

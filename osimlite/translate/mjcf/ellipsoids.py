@@ -10,8 +10,8 @@ from itertools import groupby
 
 import numpy as np
 
-from osimlite.multibody.motions import EllipsoidPoint
-from osimlite.robot.robot import RobotJoint
+from osimlite.mechanics.multibody.motions import EllipsoidPoint
+from osimlite.simulation.robot.robot import RobotJoint
 from osimlite.translate.mjcf.draft import SPECK, Draft, Follower, add, pose
 
 

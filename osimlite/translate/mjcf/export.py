@@ -9,19 +9,19 @@ from lxml.etree import Comment, _Comment, tostring
 from numpy.polynomial.polynomial import polyval
 
 from osimlite import __version__
-from osimlite.document.printer import to_text
+from osimlite.base.records import dataclass, field
 from osimlite.errors import SettingError
-from osimlite.meshes.folders import MeshFolders
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.extremes import any_numbers
-from osimlite.multibody.mechanism import Values
-from osimlite.records import dataclass, field
-from osimlite.robot.build import build_robot
-from osimlite.robot.mesh_files import MeshFiles
-from osimlite.robot.names import coordinate_names, legal, xml_name
-from osimlite.robot.robot import Robot
-from osimlite.robot.visuals import Visuals, collect_visuals
+from osimlite.io.document.printer import to_text
+from osimlite.io.meshes.folders import MeshFolders
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.extremes import any_numbers
+from osimlite.mechanics.multibody.mechanism import Values
 from osimlite.schema.model import Model
+from osimlite.simulation.robot.build import build_robot
+from osimlite.simulation.robot.mesh_files import MeshFiles
+from osimlite.simulation.robot.names import coordinate_names, legal, xml_name
+from osimlite.simulation.robot.robot import Robot
+from osimlite.simulation.robot.visuals import Visuals, collect_visuals
 from osimlite.translate.fidelity import Fidelity
 from osimlite.translate.files import write_files
 from osimlite.translate.mjcf.bodies import add_bodies, add_frames
@@ -29,7 +29,17 @@ from osimlite.translate.mjcf.constraints import add_constraints
 from osimlite.translate.mjcf.contacts import add_contacts
 from osimlite.translate.mjcf.coordinates import add_coordinates
 from osimlite.translate.mjcf.couplings import add_couplings
-from osimlite.translate.mjcf.draft import Contact, Draft, Fit, Follower, Lead, Options, Spline, Version, add
+from osimlite.translate.mjcf.draft import (
+    Contact,
+    Draft,
+    Fit,
+    Follower,
+    Lead,
+    Options,
+    Spline,
+    Version,
+    add,
+)
 from osimlite.translate.mjcf.driven import add_driven
 from osimlite.translate.mjcf.forces import add_forces
 from osimlite.translate.mjcf.keyframe import add_keyframe

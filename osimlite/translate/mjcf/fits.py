@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from osimlite._require import require
-from osimlite.multibody.spatial import Array, offset
-from osimlite.records import replace
+from osimlite.base.records import replace
+from osimlite.base.require import require
+from osimlite.mechanics.multibody.spatial import Array, offset
 from osimlite.translate.mjcf.routes import Router
 from osimlite.translate.mjcf.tendons import Around, Spot, Tendon
 

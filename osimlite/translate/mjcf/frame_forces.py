@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.multibody.mechanism import GROUND, FramePlacement
-from osimlite.multibody.spatial import Array, angles_xyz, inverse
-from osimlite.schema.actuators import BodyActuator, PointActuator, PointToPointActuator, TorqueActuator
+from osimlite.mechanics.multibody.mechanism import GROUND, FramePlacement
+from osimlite.mechanics.multibody.spatial import Array, angles_xyz, inverse
+from osimlite.schema.actuators import (
+    BodyActuator,
+    PointActuator,
+    PointToPointActuator,
+    TorqueActuator,
+)
 from osimlite.schema.base import Component
 from osimlite.schema.fields import Vec3
 from osimlite.schema.springs import BushingForce, PointToPointSpring

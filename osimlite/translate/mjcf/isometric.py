@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import SimulationError
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.frames import Body
 from osimlite.schema.functions import LinearFunction

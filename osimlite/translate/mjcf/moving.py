@@ -12,9 +12,9 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial
 
-from osimlite._require import require
-from osimlite.multibody.functions import Function
-from osimlite.multibody.spatial import Array
+from osimlite.base.require import require
+from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.translate.mjcf.polynomials import DEGREE, as_polynomial, sampled
 
 REACH = 0.02

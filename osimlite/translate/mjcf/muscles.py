@@ -19,11 +19,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite._require import require
+from osimlite.base.require import require
 from osimlite.errors import OsimliteError
-from osimlite.forces.old_muscles import schutte_velocity
-from osimlite.multibody.schema_functions import numeric
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.laws.old_muscles import schutte_velocity
+from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated, Schutte1993Muscle_Deprecated
 from osimlite.schema.states import states_of

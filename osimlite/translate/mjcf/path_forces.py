@@ -6,7 +6,7 @@ import numpy as np
 from lxml.etree import _Element
 
 from osimlite.errors import OsimliteError
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
 from osimlite.translate.fidelity import Error

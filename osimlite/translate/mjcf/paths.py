@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from osimlite.kernels.paths import CONDITIONAL, MOVING
-from osimlite.multibody.mechanism import GROUND
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, field
+from osimlite.base.records import dataclass, field
+from osimlite.mechanics.kernels.paths import CONDITIONAL, MOVING
+from osimlite.mechanics.multibody.mechanism import GROUND
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.forces import Force
 from osimlite.schema.paths import AbstractGeometryPath
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints

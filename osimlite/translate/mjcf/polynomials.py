@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial
 
-from osimlite.multibody import functions as f
-from osimlite.multibody.spatial import Array
-from osimlite.robot.drivers import Composed, knots
-from osimlite.robot.lines import as_line
+from osimlite.mechanics.multibody import functions as f
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.simulation.robot.drivers import Composed, knots
+from osimlite.simulation.robot.lines import as_line
 from osimlite.translate.fidelity import Error
 
 DEGREE = 4

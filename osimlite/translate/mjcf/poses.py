@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite.multibody.constraints import Coupler
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.multibody.constraints import Coupler
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.paths import Paths
 from osimlite.translate.fidelity import Error
 

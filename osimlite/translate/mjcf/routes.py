@@ -12,9 +12,9 @@ from itertools import chain, combinations, groupby, pairwise, product
 
 import numpy as np
 
-from osimlite.kernels.paths import CONDITIONAL, MOVING
-from osimlite.multibody.spatial import Array, rotation_about, transform
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.kernels.paths import CONDITIONAL, MOVING
+from osimlite.mechanics.multibody.spatial import Array, rotation_about, transform
 from osimlite.simulation.elements.geometries.paths.geometry_path import Node, ThroughPoints
 from osimlite.translate.mjcf.moving import composition
 from osimlite.translate.mjcf.poses import Places, Poses, Truth

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.multibody.spatial import cross
-from osimlite.robot.shapes import Ball, Box, MeshFile, Tube, Visual
+from osimlite.mechanics.multibody.spatial import cross
+from osimlite.simulation.robot.shapes import Ball, Box, MeshFile, Tube, Visual
 from osimlite.translate.mjcf.draft import Draft, Value, add, pose
 
 LOOKS, TOUCHES, MARKS, FRAMES = 2, 3, 4, 5

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from osimlite.multibody.spatial import Array, transform
-from osimlite.records import replace
+from osimlite.base.records import replace
+from osimlite.mechanics.multibody.spatial import Array, transform
 from osimlite.simulation.elements.geometries.paths.geometry_path import Surface
 from osimlite.translate.mjcf.tendons import Around, Spot
 

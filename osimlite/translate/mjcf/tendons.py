@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass, replace
+from osimlite.base.records import dataclass, replace
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.translate.mjcf.poses import Poses, each_pose
 from osimlite.translate.mjcf.wrapping import bend, norm, unit
 

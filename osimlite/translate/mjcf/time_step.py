@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.errors import OsimliteError
-from osimlite.kernels.constrained_dynamics import SAFE_MASS
-from osimlite.multibody.linear import solutions, stacked
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.kernels.constrained_dynamics import SAFE_MASS
+from osimlite.mechanics.multibody.linear import solutions, stacked
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.spatial import Array
 
 Mask = NDArray[np.bool_]
 

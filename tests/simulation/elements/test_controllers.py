@@ -7,7 +7,7 @@ import pytest
 import osimlite
 from osimlite import Model
 from osimlite.errors import OsimliteError, UnsupportedError
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.actuators import CoordinateActuator
 from osimlite.schema.controller_types import (
     ControlSetController,

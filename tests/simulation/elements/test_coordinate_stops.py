@@ -9,7 +9,10 @@ import pytest
 
 import osimlite
 from osimlite.errors import ModelError
-from osimlite.schema.coordinate_stops import CoordinateLinearStopForce, ExponentialCoordinateLimitForce
+from osimlite.schema.coordinate_stops import (
+    CoordinateLinearStopForce,
+    ExponentialCoordinateLimitForce,
+)
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements.kinds.coordinate_linear_stop_force import stop
 from osimlite.simulation.elements.kinds.exponential_coordinate_limit_force import limits

@@ -9,7 +9,7 @@ import re
 import pytest
 
 import osimlite
-from osimlite._load import module_name
+from osimlite.base.load import module_name
 from osimlite.schema.states import states_of
 from osimlite.simulation.elements.kind import Kind, kind_of_class, kinds
 

@@ -10,9 +10,13 @@ import numpy as np
 import pytest
 
 from osimlite.errors import ModelError, SimulationError
-from osimlite.multibody import build_mechanism
-from osimlite.multibody.extremes import any_numbers
-from osimlite.schema.muscle_curves import ActiveForceLengthCurve, ForceVelocityCurve, TendonForceLengthCurve
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.extremes import any_numbers
+from osimlite.schema.muscle_curves import (
+    ActiveForceLengthCurve,
+    ForceVelocityCurve,
+    TendonForceLengthCurve,
+)
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements

@@ -10,7 +10,7 @@ import pytest
 import osimlite
 from osimlite import Model
 from osimlite.errors import DoubtfulWarning, ModelError
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
 from osimlite.schema.metabolics import (
     Umberger2010MuscleMetabolicsProbe,

@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from osimlite.kernels import layout, pointers
-from osimlite.kernels.condensation import INVERSE, WIDTH
-from osimlite.kernels.layout import MODEL, OUTCOME, STAGE, WORK
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.kernels import layout, pointers
+from osimlite.mechanics.kernels.condensation import INVERSE, WIDTH
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.kind import DeclaredForce
 from osimlite.simulation.elements.laws import RESPONSE
 from osimlite.simulation.engines.linking import COMPILED
 from osimlite.simulation.system import System
-from tests.backends.jets import Jet, _carried
+from tests.derivatives.jets import Jet, _carried
 from tests.simulation.checked import Checked
 from tests.simulation.elements.muscle_rows import CONFIGURATIONS, hung, muscle
 from tests.simulation.force_cases import FORCE_NAMES, FORCES, with_force

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from osimlite.codegen.toolchain import CompilationError, find_compiler
+from osimlite.mechanics.codegen.toolchain import CompilationError, find_compiler
 from osimlite.simulation.engines import compiled_laws
 from osimlite.simulation.engines.compiled_laws import compile_function, load_function
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from osimlite.codegen.toolchain import NATIVE, library_suffix
+from osimlite.mechanics.codegen.toolchain import NATIVE, library_suffix
 from osimlite.simulation.elements.laws import DIRECTIONS, library_laws
 from osimlite.simulation.engines import kernel_library
 from osimlite.simulation.engines.kernel_library import KernelLibrary, load_library
@@ -46,7 +46,7 @@ def library(tmp_path, monkeypatch):
 def test_touched_files_count_as_unchanged(library, tmp_path):
     before = library.changed_files
     del library.changed_files
-    os.utime(tmp_path / "kernels/dynamics.py", (0, 0))
+    os.utime(tmp_path / "mechanics/kernels/dynamics.py", (0, 0))
     assert library.changed_files == before
 
 
@@ -55,9 +55,9 @@ def test_an_edited_law_is_not_taken_from_the_library(library, tmp_path, monkeypa
     if library.changed_files:
         pytest.skip("the sources have changed since the library was compiled: pip install -e .")
     del library.changed_files
-    path = tmp_path / "kernels/dynamics.py"
+    path = tmp_path / "mechanics/kernels/dynamics.py"
     path.write_text(path.read_text("utf-8") + "\n# edited\n", "utf-8")
-    assert library.changed_files == ["kernels/dynamics.py"]
+    assert library.changed_files == ["mechanics/kernels/dynamics.py"]
     # Only a comment: every law is what it was.
     assert library.address("evaluate") is not None
     monkeypatch.setattr(kernel_library, "compute_digest", lambda function: "of an edited function")
@@ -66,7 +66,7 @@ def test_an_edited_law_is_not_taken_from_the_library(library, tmp_path, monkeypa
 
 @needs_library
 def test_another_translator_concerns_all_laws(library, tmp_path):
-    path = tmp_path / "codegen/cplusplus/library.py"
+    path = tmp_path / "mechanics/codegen/cplusplus/library.py"
     path.write_text(path.read_text("utf-8") + "\n# edited\n", "utf-8")
     assert library.address("evaluate") is None
 

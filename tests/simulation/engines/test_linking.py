@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite._require import absent
-from osimlite.backends import tangents
+from osimlite.base.require import absent
+from osimlite.derivatives import tangents
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation.engines import linking
 from osimlite.simulation.engines.machine_code import has_machine_code

@@ -6,9 +6,15 @@ from typing import ClassVar
 
 import pytest
 
-from osimlite.codegen.toolchain import CompilationError
 from osimlite.errors import OsimliteError
-from osimlite.simulation.engines import compiled_laws, kernel_library, linking, machine_code, numba_laws
+from osimlite.mechanics.codegen.toolchain import CompilationError
+from osimlite.simulation.engines import (
+    compiled_laws,
+    kernel_library,
+    linking,
+    machine_code,
+    numba_laws,
+)
 
 
 class Library:

@@ -14,7 +14,7 @@ import pytest
 import osimlite
 from osimlite.cli import main
 from osimlite.errors import OsimliteError
-from osimlite.simulation.files.storage import read_sto, write_sto
+from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.tools.running import run
 
 REFERENCE = "oracle/tools/reference"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from osimlite.multibody.spatial import Array, transform
-from osimlite.robot.principal_axes import principal_axes
+from osimlite.mechanics.multibody.spatial import Array, transform
+from osimlite.simulation.robot.principal_axes import principal_axes
 from osimlite.translate.mjcf.export import Mjcf
 
 

@@ -22,7 +22,7 @@ from osimlite import (
     SliderJoint,
     WeldConstraint,
 )
-from osimlite.multibody.spatial import angles_xyz
+from osimlite.mechanics.multibody.spatial import angles_xyz
 from osimlite.translate import to_mjcf
 from tests.translate.mjcf.compiled import Compiled
 from tests.translate.mjcf.test_forces import A, chain

@@ -8,9 +8,9 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.multibody.constraints import Coupler
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
+from osimlite.mechanics.multibody.constraints import Coupler
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.translate import to_mjcf
 from tests.conftest import CorpusModel
 from tests.translate.mjcf.compiled import Compiled

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.multibody.functions import Polynomial, Sine
+from osimlite.mechanics.multibody.functions import Polynomial, Sine
 from osimlite.schema.frames import Body
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model

@@ -26,7 +26,7 @@ from osimlite import (
     TorqueActuator,
     UniversalJoint,
 )
-from osimlite.kernels.layout import STAGE
+from osimlite.mechanics.kernels.layout import STAGE
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.linking import PYTHON
 from osimlite.simulation.given_controls import driven

@@ -33,7 +33,14 @@ from osimlite.errors import UnsupportedError
 from osimlite.schema.functions import LinearFunction, SimmSpline
 from osimlite.schema.geometry import Sphere
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
-from osimlite.schema.paths import GeometryPath, MovingPathPoint, PathPoint, PathPointSet, PathWrap, PathWrapSet
+from osimlite.schema.paths import (
+    GeometryPath,
+    MovingPathPoint,
+    PathPoint,
+    PathPointSet,
+    PathWrap,
+    PathWrapSet,
+)
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid
 
 HOSTILE = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import osimlite
-from osimlite.document.reader import read_text
+from osimlite.io.document.reader import read_text
 from tests.lint.verdict_cases import path_of, small_model
 
 

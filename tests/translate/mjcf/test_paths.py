@@ -16,7 +16,13 @@ from osimlite.schema.joints import PinJoint, SliderJoint
 from osimlite.schema.model import Model
 from osimlite.schema.path_actuators import PathActuator
 from osimlite.schema.path_forces import PathSpring
-from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, MovingPathPoint, PathPoint, PathWrap
+from osimlite.schema.paths import (
+    ConditionalPathPoint,
+    GeometryPath,
+    MovingPathPoint,
+    PathPoint,
+    PathWrap,
+)
 from osimlite.schema.wrapping import WrapCylinder
 from osimlite.translate import to_mjcf
 from osimlite.translate.mjcf.poses import random_values

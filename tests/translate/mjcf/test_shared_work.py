@@ -6,7 +6,7 @@ import numpy as np
 
 import osimlite
 from osimlite import Body, Coordinate, CoordinateCouplerConstraint, Model, PinJoint
-from osimlite.multibody.functions import Scaled, SimmSpline
+from osimlite.mechanics.multibody.functions import Scaled, SimmSpline
 from osimlite.schema.functions import LinearFunction
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import PathPoint

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from osimlite.base.text import did_you_mean
 from osimlite.errors import ModelError
+from osimlite.io.tables.storage import beside
 from osimlite.schema.controller_types import ControlSetController
 from osimlite.simulation.elements.control_sets import ControlCurves
 from osimlite.simulation.elements.controls import Drive, actuators_by_name, named
 from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.files.storage import beside
-from osimlite.text import did_you_mean
 
 
 def drives(builder: ElementBuilder, controller: ControlSetController) -> Iterator[Drive]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from osimlite.base.text import did_you_mean
 from osimlite.errors import ModelError, UnsupportedError
+from osimlite.io.tables.storage import beside
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.simulation.elements.control_tables import column_function, read_controls
 from osimlite.simulation.elements.controls import Drive, actuators_by_name, named
 from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.files.storage import beside
-from osimlite.text import did_you_mean
 
 LISTS_OF_PATHS = 40600
 """Documents before this version name actuators by their names."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.multibody.functions import Scaled
+from osimlite.mechanics.multibody.functions import Scaled
 from osimlite.schema.controller_types import SynergyController
 from osimlite.simulation.elements.controls import Drive, named
 from osimlite.simulation.elements.gather import ElementBuilder

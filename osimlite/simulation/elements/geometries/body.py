@@ -8,11 +8,27 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite.errors import ModelError
-from osimlite.forces.vectors import Vector, dot, minus, norm, put, times, turned_back, vector
-from osimlite.kernels.pointers import Floats, Ints, at
-from osimlite.kernels.points import angular_velocity, apply_force, apply_torque, direction, station, velocity
-from osimlite.multibody.links import Places
-from osimlite.multibody.mechanism import GROUND
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.points import (
+    angular_velocity,
+    apply_force,
+    apply_torque,
+    direction,
+    station,
+    velocity,
+)
+from osimlite.mechanics.laws.vectors import (
+    Vector,
+    dot,
+    minus,
+    norm,
+    put,
+    times,
+    turned_back,
+    vector,
+)
+from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 

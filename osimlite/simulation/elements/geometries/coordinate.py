@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from osimlite.kernels.layout import MODEL
-from osimlite.kernels.pointers import Floats, Ints
-from osimlite.multibody.links import Places
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.kernels.layout import MODEL
+from osimlite.mechanics.kernels.pointers import Floats, Ints
+from osimlite.mechanics.multibody.links import Places
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import Geometry
 

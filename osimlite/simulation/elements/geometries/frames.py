@@ -7,13 +7,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from osimlite.forces.bushing import xyz_angles, xyz_moment, xyz_rates
-from osimlite.forces.vectors import minus, put, times, turned, turned_back, vector
-from osimlite.kernels.pointers import Floats, Ints, at
-from osimlite.kernels.points import angular_velocity, apply_force, apply_torque, direction, station, velocity
-from osimlite.multibody.links import Places
-from osimlite.multibody.spatial import Array
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.points import (
+    angular_velocity,
+    apply_force,
+    apply_torque,
+    direction,
+    station,
+    velocity,
+)
+from osimlite.mechanics.laws.bushing import xyz_angles, xyz_moment, xyz_rates
+from osimlite.mechanics.laws.vectors import minus, put, times, turned, turned_back, vector
+from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import Geometry
 

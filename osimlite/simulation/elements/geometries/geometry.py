@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
-from osimlite.multibody.links import Places
+from osimlite.mechanics.multibody.links import Places
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.items import Item
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from osimlite.forces.vectors import dot, minus, norm, put, times, vector
-from osimlite.kernels.pointers import Floats, Ints
-from osimlite.kernels.points import apply_force, station, velocity
-from osimlite.multibody.links import Places
-from osimlite.records import dataclass
+from osimlite.base.records import dataclass
+from osimlite.mechanics.kernels.pointers import Floats, Ints
+from osimlite.mechanics.kernels.points import apply_force, station, velocity
+from osimlite.mechanics.laws.vectors import dot, minus, norm, put, times, vector
+from osimlite.mechanics.multibody.links import Places
 from osimlite.simulation.elements.gather import ElementBuilder, Triple, triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from osimlite.forces.vectors import dot, minus, plus, put, turned_back, vector
-from osimlite.kernels.functions import value_at
-from osimlite.kernels.pointers import Floats, Ints, at
-from osimlite.kernels.points import apply_force, apply_torque, direction, station
-from osimlite.multibody.function_tables import table_of_one
-from osimlite.multibody.functions import Function
-from osimlite.multibody.links import Places
-from osimlite.multibody.mechanism import FramePlacement
+from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.points import apply_force, apply_torque, direction, station
+from osimlite.mechanics.laws.vectors import dot, minus, plus, put, turned_back, vector
+from osimlite.mechanics.multibody.function_tables import table_of_one
+from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.mechanism import FramePlacement
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 FRAME = 12

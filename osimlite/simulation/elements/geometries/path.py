@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from osimlite.kernels.paths import known_length, path_length, pull_path
-from osimlite.multibody.links import Places
+from osimlite.mechanics.kernels.paths import known_length, path_length, pull_path
+from osimlite.mechanics.multibody.links import Places
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of, module_of
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.items import Item
@@ -17,7 +17,7 @@ class Path(Protocol):
     coupled: bool  # whether its moment arm about a coordinate takes in those that must move with that
 
     def items(self, places: Places) -> list[Item]:
-        """Parts, of which the last is the path's own; see :mod:`osimlite.kernels.paths`."""
+        """Parts, of which the last is the path's own; see :mod:`osimlite.mechanics.kernels.paths`."""
 
 
 class AlongPath(Geometry):

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import ModelError
-from osimlite.forces.vectors import Vector, along, dot, minus, put, times, vector
-from osimlite.kernels.pointers import Floats, Ints
-from osimlite.kernels.points import apply_force, direction, station, velocity
-from osimlite.multibody.links import Places
+from osimlite.mechanics.kernels.pointers import Floats, Ints
+from osimlite.mechanics.kernels.points import apply_force, direction, station, velocity
+from osimlite.mechanics.laws.vectors import Vector, along, dot, minus, put, times, vector
+from osimlite.mechanics.multibody.links import Places
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
 from osimlite.simulation.elements.contact import ContactSurface, surface_of
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of

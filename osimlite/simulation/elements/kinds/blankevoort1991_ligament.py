@@ -1,6 +1,6 @@
 """A ligament by Blankevoort and Huiskes."""
 
-from osimlite.forces.springs import blankevoort_energy, blankevoort_tension
+from osimlite.mechanics.laws.springs import blankevoort_energy, blankevoort_tension
 from osimlite.schema.path_forces import Blankevoort1991Ligament
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.kind import Kind

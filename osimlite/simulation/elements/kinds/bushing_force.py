@@ -1,8 +1,8 @@
 """A bushing whose loads are linear in its deviations."""
 
-from osimlite.forces.bushing import bushing_dissipation, bushing_load
-from osimlite.forces.springs import spring_energy
-from osimlite.kernels.pointers import Floats
+from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.laws.bushing import bushing_dissipation, bushing_load
+from osimlite.mechanics.laws.springs import spring_energy
 from osimlite.schema.springs import BushingForce
 from osimlite.simulation.elements.geometries.frames import BetweenFrames, damped
 from osimlite.simulation.elements.kind import Kind, State

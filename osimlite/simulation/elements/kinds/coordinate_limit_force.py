@@ -1,7 +1,12 @@
 """Springs and dampers that act once a coordinate has left its limits."""
 
-from osimlite.forces.coordinate_limit import limit_constants, limit_dissipation, limit_energy, limit_force
-from osimlite.multibody.mechanism import CoordinateInfo
+from osimlite.mechanics.laws.coordinate_limit import (
+    limit_constants,
+    limit_dissipation,
+    limit_energy,
+    limit_force,
+)
+from osimlite.mechanics.multibody.mechanism import CoordinateInfo
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.coordinate import COORDINATE

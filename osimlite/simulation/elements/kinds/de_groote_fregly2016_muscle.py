@@ -1,6 +1,6 @@
 """The muscle by De Groote and Fregly."""
 
-from osimlite.forces.smooth_muscles import (
+from osimlite.mechanics.laws.smooth_muscles import (
     LARGEST_FORCE,
     SmoothTendon,
     degroote,

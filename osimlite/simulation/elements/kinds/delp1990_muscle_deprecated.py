@@ -2,13 +2,19 @@
 
 from typing import NamedTuple
 
-from osimlite.forces.muscles import MuscleInputs
-from osimlite.forces.old_muscles import OldMuscle, scaled_activation_rate
-from osimlite.kernels.functions import value_at
-from osimlite.kernels.pointers import Floats
+from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.laws.muscles import MuscleInputs
+from osimlite.mechanics.laws.old_muscles import OldMuscle, scaled_activation_rate
 from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated
 from osimlite.simulation.elements.kind import State
-from osimlite.simulation.elements.old_muscle import fibers_at, isometric_length, old_muscle, recorded, strongest
+from osimlite.simulation.elements.old_muscle import (
+    fibers_at,
+    isometric_length,
+    old_muscle,
+    recorded,
+    strongest,
+)
 from osimlite.simulation.elements.parameters import Curve, Fields, Number, Together, positive
 
 

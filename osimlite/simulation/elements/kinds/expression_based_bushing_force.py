@@ -1,7 +1,7 @@
 """A bushing whose loads are formulas of all its deviations; its energy is not known."""
 
-from osimlite.kernels.pointers import Floats, Ints, at
-from osimlite.kernels.programs import compute
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.programs import compute
 from osimlite.schema.springs import ExpressionBasedBushingForce
 from osimlite.simulation.elements.geometries.frames import BetweenFrames, damp
 from osimlite.simulation.elements.kind import Kind

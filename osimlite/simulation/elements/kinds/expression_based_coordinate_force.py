@@ -1,6 +1,6 @@
 """A force on a coordinate by a formula; its energy is not known."""
 
-from osimlite.kernels.programs import of_two
+from osimlite.mechanics.kernels.programs import of_two
 from osimlite.schema.springs import ExpressionBasedCoordinateForce
 from osimlite.simulation.elements.geometries.coordinate import COORDINATE
 from osimlite.simulation.elements.kind import Kind

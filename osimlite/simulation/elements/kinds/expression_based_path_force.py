@@ -1,8 +1,8 @@
 """A tension along a path by a formula in stretch and lengthening speed; its energy is not known."""
 
-from osimlite.forces.springs import stretch
-from osimlite.kernels.pointers import Floats, Ints
-from osimlite.kernels.programs import of_two
+from osimlite.mechanics.kernels.pointers import Floats, Ints
+from osimlite.mechanics.kernels.programs import of_two
+from osimlite.mechanics.laws.springs import stretch
 from osimlite.schema.path_forces import ExpressionBasedPathForce
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.kind import Kind

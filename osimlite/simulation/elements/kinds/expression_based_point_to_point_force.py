@@ -1,6 +1,6 @@
 """A force between two points by a formula, positive where it pulls; its energy is not known."""
 
-from osimlite.kernels.programs import of_two
+from osimlite.mechanics.kernels.programs import of_two
 from osimlite.schema.springs import ExpressionBasedPointToPointForce
 from osimlite.simulation.elements.geometries.line import BetweenPoints
 from osimlite.simulation.elements.kind import Kind

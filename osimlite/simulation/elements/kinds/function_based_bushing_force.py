@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from osimlite.kernels.functions import value_at
-from osimlite.kernels.pointers import Floats
+from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.schema.springs import FunctionBasedBushingForce
 from osimlite.simulation.elements.geometries.frames import DEVIATIONS, BetweenFrames, damp
 from osimlite.simulation.elements.integral import integral

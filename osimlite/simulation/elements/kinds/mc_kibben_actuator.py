@@ -1,6 +1,6 @@
 """A pneumatic muscle, whose control is a pressure."""
 
-from osimlite.forces.springs import mckibben_tension
+from osimlite.mechanics.laws.springs import mckibben_tension
 from osimlite.schema.path_actuators import McKibbenActuator
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.kind import Kind

@@ -1,6 +1,6 @@
 """The muscle by Meyer and Fregly, whose tendon is rigid whatever is said of it."""
 
-from osimlite.forces.smooth_muscles import meyer, meyer_rigid
+from osimlite.mechanics.laws.smooth_muscles import meyer, meyer_rigid
 from osimlite.schema.muscles import MeyerFregly2016Muscle
 from osimlite.simulation.elements.muscle import SPRING, muscle
 from osimlite.simulation.elements.smooth_muscle import ACTIVATION, check_smooth, smooth_fields

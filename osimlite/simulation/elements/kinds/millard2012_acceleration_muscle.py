@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import cos, pi
 from typing import Any
 
-from osimlite.forces.millard2012_acceleration import (
+from osimlite.mechanics.laws.millard2012_acceleration import (
     AccelerationCurves,
     Millard2012Acceleration,
     millard2012_acceleration,
@@ -12,7 +12,7 @@ from osimlite.forces.millard2012_acceleration import (
     millard2012_acceleration_equilibrium,
     millard2012_acceleration_rigid,
 )
-from osimlite.forces.muscle_curves import (
+from osimlite.mechanics.laws.muscle_curves import (
     ACTIVE_SIZE,
     COMPRESSIVE_SIZE,
     PASSIVE_SIZE,
@@ -25,7 +25,7 @@ from osimlite.forces.muscle_curves import (
     force_velocity,
     tendon_force_length,
 )
-from osimlite.forces.muscles import pennation
+from osimlite.mechanics.laws.muscles import pennation
 from osimlite.schema.muscles import Millard2012AccelerationMuscle
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.kind import DeclaredForce, State

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from osimlite.forces.millard2012_equilibrium import (
+from osimlite.mechanics.laws.millard2012_equilibrium import (
     Fibers,
     Millard2012Equilibrium,
     MillardCurves,
@@ -19,7 +19,7 @@ from osimlite.forces.millard2012_equilibrium import (
     millard2012_rigid,
     muscle_of,
 )
-from osimlite.forces.muscle_curves import (
+from osimlite.mechanics.laws.muscle_curves import (
     ACTIVE_SIZE,
     PASSIVE_SIZE,
     TENDON_SIZE,
@@ -29,7 +29,7 @@ from osimlite.forces.muscle_curves import (
     force_velocity,
     tendon_force_length,
 )
-from osimlite.forces.muscles import SIGNIFICANT, pennation
+from osimlite.mechanics.laws.muscles import SIGNIFICANT, pennation
 from osimlite.schema.muscle_parts import MuscleFirstOrderActivationDynamicModel
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
 from osimlite.simulation.elements.gather import ElementBuilder

@@ -1,6 +1,6 @@
 """A spring along a path."""
 
-from osimlite.forces.springs import path_spring_energy, path_spring_tension
+from osimlite.mechanics.laws.springs import path_spring_energy, path_spring_tension
 from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.kind import Kind

@@ -1,6 +1,6 @@
 """A spring between two points."""
 
-from osimlite.forces.springs import point_spring_tension, spring_energy
+from osimlite.mechanics.laws.springs import point_spring_tension, spring_energy
 from osimlite.schema.springs import PointToPointSpring
 from osimlite.simulation.elements.geometries.line import BetweenPoints
 from osimlite.simulation.elements.kind import Kind

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.multibody.mechanism import GROUND, FramePlacement
+from osimlite.mechanics.multibody.mechanism import GROUND, FramePlacement
 from osimlite.schema.prescribed import PrescribedForce
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.load import GivenLoad, Load

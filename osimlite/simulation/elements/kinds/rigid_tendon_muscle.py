@@ -3,9 +3,9 @@
 from math import sqrt
 from typing import NamedTuple
 
-from osimlite.forces.muscles import MuscleInputs
-from osimlite.kernels.functions import value_at
-from osimlite.kernels.pointers import Floats
+from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.laws.muscles import MuscleInputs
 from osimlite.schema.muscles import RigidTendonMuscle
 from osimlite.simulation.elements.muscle import height, muscle
 from osimlite.simulation.elements.parameters import Curve, Fields, Number, Together, positive

@@ -2,8 +2,10 @@
 
 from typing import NamedTuple
 
-from osimlite.forces.muscles import MuscleInputs
-from osimlite.forces.old_muscles import (
+from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.laws.muscles import MuscleInputs
+from osimlite.mechanics.laws.old_muscles import (
     NOTHING,
     OldMuscle,
     rigid_cos,
@@ -11,11 +13,15 @@ from osimlite.forces.old_muscles import (
     schutte_passive_force,
     schutte_velocity,
 )
-from osimlite.kernels.functions import value_at
-from osimlite.kernels.pointers import Floats
 from osimlite.schema.old_muscles import Schutte1993Muscle_Deprecated
 from osimlite.simulation.elements.gather import ElementBuilder
-from osimlite.simulation.elements.old_muscle import fibers_at, isometric_length, old_muscle, recorded, strongest
+from osimlite.simulation.elements.old_muscle import (
+    fibers_at,
+    isometric_length,
+    old_muscle,
+    recorded,
+    strongest,
+)
 from osimlite.simulation.elements.parameters import Curve, Fields, Number, Together, positive
 
 

@@ -3,8 +3,12 @@
 from typing import Any
 
 from osimlite.errors import ModelError
-from osimlite.forces.smooth_contact import smooth_contact_energy, smooth_contact_force, smooth_hertz
-from osimlite.forces.vectors import Vector
+from osimlite.mechanics.laws.smooth_contact import (
+    smooth_contact_energy,
+    smooth_contact_force,
+    smooth_hertz,
+)
+from osimlite.mechanics.laws.vectors import Vector
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.geometries.sphere_on_plane import SPHERE_ON_PLANE

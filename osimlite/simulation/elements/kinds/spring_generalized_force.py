@@ -1,6 +1,6 @@
 """Springs on a coordinate."""
 
-from osimlite.forces.springs import coordinate_spring_force, spring_energy
+from osimlite.mechanics.laws.springs import coordinate_spring_force, spring_energy
 from osimlite.schema.springs import SpringGeneralizedForce
 from osimlite.simulation.elements.geometries.coordinate import COORDINATE
 from osimlite.simulation.elements.kind import Kind

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from math import exp
 
-from osimlite.forces.muscles import pennation
-from osimlite.forces.thelen2003 import (
+from osimlite.mechanics.laws.muscles import pennation
+from osimlite.mechanics.laws.thelen2003 import (
     Thelen2003,
     tendon_shape,
     thelen2003,

@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from osimlite.forces.muscles import MuscleInputs
-from osimlite.forces.old_muscles import (
+from osimlite.mechanics.laws.muscles import MuscleInputs
+from osimlite.mechanics.laws.old_muscles import (
     NOTHING,
     OldMuscle,
     rigid_cos,
@@ -13,7 +13,13 @@ from osimlite.forces.old_muscles import (
     thelen_velocity,
 )
 from osimlite.schema.old_muscles import Thelen2003Muscle_Deprecated
-from osimlite.simulation.elements.old_muscle import fibers_at, isometric_length, old_muscle, recorded, strongest
+from osimlite.simulation.elements.old_muscle import (
+    fibers_at,
+    isometric_length,
+    old_muscle,
+    recorded,
+    strongest,
+)
 from osimlite.simulation.elements.parameters import Fields, Number, positive
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from osimlite.forces.metabolics import Bhargava2004, bhargava2004
-from osimlite.kernels.functions import value_at
-from osimlite.kernels.pointers import Floats
+from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.laws.metabolics import Bhargava2004, bhargava2004
 from osimlite.schema.metabolics import Bhargava2004MuscleMetabolicsProbe
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.metabolic import metabolic

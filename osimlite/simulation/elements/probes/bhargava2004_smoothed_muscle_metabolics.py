@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from osimlite.forces.metabolics import Bhargava2004, Smoothed, bhargava2004_smoothed
-from osimlite.multibody.functions import PiecewiseLinear
+from osimlite.mechanics.laws.metabolics import Bhargava2004, Smoothed, bhargava2004_smoothed
+from osimlite.mechanics.multibody.functions import PiecewiseLinear
 from osimlite.schema.metabolics import Bhargava2004SmoothedMuscleMetabolics
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.metabolic import mass
 from osimlite.simulation.elements.probe import DeclaredProbe, ProbeKind, Reading, Subject
-from osimlite.simulation.elements.probes.bhargava2004_muscle_metabolics_probe import READS, of_muscle
+from osimlite.simulation.elements.probes.bhargava2004_muscle_metabolics_probe import (
+    READS,
+    of_muscle,
+)
 
 RATES = "metabolic", "activation", "maintenance", "shortening", "mechanical_work"
 MAINTAINED = PiecewiseLinear((0.0, 0.5, 1.0, 1.5, 10.0), (0.5, 0.5, 1.0, 0.0, 0.0))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.multibody.constraints import Lock, Prescribed
+from osimlite.mechanics.multibody.constraints import Lock, Prescribed
 from osimlite.schema.probe_types import JointInternalPowerProbe
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.probe import DeclaredProbe, ProbeKind, Reading, members_of

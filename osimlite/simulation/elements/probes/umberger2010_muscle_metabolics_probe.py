@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.forces.metabolics import Umberger2010, umberger2010
+from osimlite.mechanics.laws.metabolics import Umberger2010, umberger2010
 from osimlite.schema.metabolics import Umberger2010MuscleMetabolicsProbe
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.metabolic import metabolic

@@ -16,15 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from osimlite.errors import OsimliteError, SimulationError, UnsupportedError
-from osimlite.kernels.layout import CHAIN, MODEL
-from osimlite.kernels.pointers import Floats, Ints
-from osimlite.multibody.constraints import Lock
-from osimlite.multibody.mechanism import Mechanism
-from osimlite.multibody.spatial import Array
-from osimlite.robot.build import build_robot
-from osimlite.robot.merge_fixed import merge_fixed
-from osimlite.robot.names import legal_names
-from osimlite.robot.robot import Robot
+from osimlite.mechanics.kernels.layout import CHAIN, MODEL
+from osimlite.mechanics.kernels.pointers import Floats, Ints
+from osimlite.mechanics.multibody.constraints import Lock
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.constrained import free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.base import KernelEngine
@@ -33,11 +29,15 @@ from osimlite.simulation.engines.bullet.stepper import BulletStepper
 from osimlite.simulation.engines.bullet.world import World, bullet
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.pack_chain import Chain
+from osimlite.simulation.robot.build import build_robot
+from osimlite.simulation.robot.merge_fixed import merge_fixed
+from osimlite.simulation.robot.names import legal_names
+from osimlite.simulation.robot.robot import Robot
 from osimlite.simulation.stepper import Observer, Stepper
 
 if TYPE_CHECKING:
-    from osimlite.robot.visuals import Visuals
     from osimlite.simulation.engines.bullet.window import Window
+    from osimlite.simulation.robot.visuals import Visuals
 
 MASS_MATRIX, ARTICULATED_BODY = "mass-matrix", "articulated-body"
 ROUTES = ("auto", MASS_MATRIX, ARTICULATED_BODY)

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from osimlite.base.records import replace
 from osimlite.errors import SimulationError
-from osimlite.records import replace
-from osimlite.robot.principal_axes import principal_axes
-from osimlite.robot.robot import Link, Robot
-from osimlite.robot.urdf import urdf_text
+from osimlite.simulation.robot.principal_axes import principal_axes
+from osimlite.simulation.robot.robot import Link, Robot
+from osimlite.simulation.robot.urdf import urdf_text
 
 
 def robot_text(robot: Robot) -> str:

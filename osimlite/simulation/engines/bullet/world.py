@@ -12,11 +12,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from osimlite._require import require
+from osimlite.base.require import require
 from osimlite.errors import SimulationError
-from osimlite.robot.principal_axes import principal_axes
-from osimlite.robot.robot import Robot, RobotJoint
 from osimlite.simulation.engines.bullet.file import excess, robot_text, temporary_file
+from osimlite.simulation.robot.principal_axes import principal_axes
+from osimlite.simulation.robot.robot import Robot, RobotJoint
 
 __all__ = ["World", "bullet", "muted"]
 

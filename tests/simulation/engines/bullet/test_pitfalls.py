@@ -12,7 +12,7 @@ import pytest
 import osimlite
 from osimlite import Body, Coordinate, Model
 from osimlite.errors import OsimliteError
-from osimlite.multibody import build_mechanism
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.simulation import pack_chain
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.engines.protocol import Settings
@@ -209,7 +209,7 @@ def test_worlds_are_left(mechanism):
 
 
 def test_bodies_can_be_seen(walker, mechanism):
-    from osimlite.robot.visuals import collect_visuals
+    from osimlite.simulation.robot.visuals import collect_visuals
 
     with BulletEngine(mechanism, Forces(()), visuals=collect_visuals(walker, mechanism)) as engine:
         shapes = bullet.getVisualShapeData(engine.world.id, physicsClientId=engine.world.client)

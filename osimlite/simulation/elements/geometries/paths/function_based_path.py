@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
+from osimlite.base.records import dataclass
 from osimlite.errors import ModelError
-from osimlite.kernels.function_paths import ARMS, DERIVATIVES
-from osimlite.kernels.layout import ITEM
-from osimlite.multibody.formula import Formula, program
-from osimlite.multibody.function_tables import table_of_one
-from osimlite.multibody.functions import Function, MultivariatePolynomial, Scaled, WeightedSum
-from osimlite.multibody.links import Places
-from osimlite.multibody.schema_functions import numeric
-from osimlite.records import dataclass
+from osimlite.mechanics.kernels.function_paths import ARMS, DERIVATIVES
+from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.multibody.formula import Formula, program
+from osimlite.mechanics.multibody.function_tables import table_of_one
+from osimlite.mechanics.multibody.functions import (
+    Function,
+    MultivariatePolynomial,
+    Scaled,
+    WeightedSum,
+)
+from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.schema_functions import numeric
 from osimlite.schema.functions import Constant, ExpressionBasedFunction, MultiplierFunction
 from osimlite.simulation.elements.gather import ElementBuilder
 from osimlite.simulation.elements.items import Item

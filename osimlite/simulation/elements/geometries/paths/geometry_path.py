@@ -12,21 +12,34 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from osimlite.base.records import dataclass, replace
 from osimlite.errors import ModelError
-from osimlite.kernels.cable_surfaces import CYLINDER, ELLIPSOID, SPHERE, TORUS
-from osimlite.kernels.geodesic_paths import slots_and_room
-from osimlite.kernels.layout import ITEM
-from osimlite.kernels.path_wraps import SURFACE_WORK
-from osimlite.kernels.paths import CLAMPED, CONDITIONAL, FIXED, MOVING, NODE_WORK, ORDER, TANGENT
-from osimlite.kernels.wrap_curves import MOST
-from osimlite.kernels.wrapping import AXIAL, HYBRID, MIDPOINT
-from osimlite.multibody.function_tables import table_of_one
-from osimlite.multibody.functions import Function
-from osimlite.multibody.links import Places
-from osimlite.multibody.spatial import Array, offset
-from osimlite.records import dataclass, replace
+from osimlite.mechanics.kernels.cable_surfaces import CYLINDER, ELLIPSOID, SPHERE, TORUS
+from osimlite.mechanics.kernels.geodesic_paths import slots_and_room
+from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.kernels.path_wraps import SURFACE_WORK
+from osimlite.mechanics.kernels.paths import (
+    CLAMPED,
+    CONDITIONAL,
+    FIXED,
+    MOVING,
+    NODE_WORK,
+    ORDER,
+    TANGENT,
+)
+from osimlite.mechanics.kernels.wrap_curves import MOST
+from osimlite.mechanics.kernels.wrapping import AXIAL, HYBRID, MIDPOINT
+from osimlite.mechanics.multibody.function_tables import table_of_one
+from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.spatial import Array, offset
 from osimlite.schema.frames import PhysicalFrame
-from osimlite.schema.paths import AbstractPathPoint, ConditionalPathPoint, MovingPathPoint, PathPoint
+from osimlite.schema.paths import (
+    AbstractPathPoint,
+    ConditionalPathPoint,
+    MovingPathPoint,
+    PathPoint,
+)
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere, WrapTorus
 from osimlite.simulation.elements.gather import ElementBuilder, kind_of
 from osimlite.simulation.elements.items import Item
@@ -217,7 +230,7 @@ def _surface(builder: ElementBuilder, wrap: Any, surface: Any, number: int, alon
 
 
 def _geodesic(surface: WrapObject) -> tuple[float, ...]:
-    """Half the length of a surface, and its numbers in :mod:`osimlite.kernels.cable_surfaces`."""
+    """Half the length of a surface, and its numbers in :mod:`osimlite.mechanics.kernels.cable_surfaces`."""
     if isinstance(surface, WrapCylinder):
         return surface.length / 2.0, CYLINDER, surface.radius, surface.radius**2, 1.0, 1.0, 0.0
     if isinstance(surface, WrapSphere):

@@ -11,8 +11,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from osimlite.base.records import dataclass, replace
 from osimlite.errors import ModelError, OsimliteError
-from osimlite.kernels.cable_paths import (
+from osimlite.mechanics.kernels.cable_paths import (
     ELEMENT_INTS,
     ELEMENTS,
     FIRST,
@@ -28,14 +29,23 @@ from osimlite.kernels.cable_paths import (
     cable_path,
     solver_room,
 )
-from osimlite.kernels.cable_surfaces import CYLINDER, ELLIPSOID, END, POINT, SPHERE, START, STEP, TORUS, value
-from osimlite.kernels.layout import ITEM
-from osimlite.kernels.paths import LENGTH
-from osimlite.kernels.wrap_curves import MOST
-from osimlite.multibody.links import Placement, Places
-from osimlite.multibody.mechanism import GROUND, Mechanism
-from osimlite.multibody.spatial import Array, offset
-from osimlite.records import dataclass, replace
+from osimlite.mechanics.kernels.cable_surfaces import (
+    CYLINDER,
+    ELLIPSOID,
+    END,
+    POINT,
+    SPHERE,
+    START,
+    STEP,
+    TORUS,
+    value,
+)
+from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.kernels.paths import LENGTH
+from osimlite.mechanics.kernels.wrap_curves import MOST
+from osimlite.mechanics.multibody.links import Placement, Places
+from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
+from osimlite.mechanics.multibody.spatial import Array, offset
 from osimlite.schema.contact import (
     ContactCylinder,
     ContactEllipsoid,

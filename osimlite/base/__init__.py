@@ -1,0 +1,1 @@
+"""Helpers that know nothing of OpenSim: text, records, options, files, quantities, optional packages."""

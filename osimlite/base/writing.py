@@ -1,0 +1,589 @@
+"""The one place that decides whether a file may be written, and writes it whole or not at all.
+
+Who chose the path decides how much is allowed (SECURITY.md states the rule for users):
+
+- :func:`write_atomically`: the user named the file or its folder. A link is followed only if it stays
+  in its project, or without one in its folder; a pipe that is read or a device takes the text.
+- :func:`write_into`: the program chose the name. Never through a link, and never into anything but a
+  regular file.
+- :class:`ResultWriter`: a document names the file. As the last, and only in the trees of the project
+  and the current folder, under no hidden name, and over nothing but a result of the same kind.
+- :func:`write_cached`: nobody named the file. A cache is in the user's cache folder, which no project
+  can fill with links.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import stat
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from osimlite.base.pruning import MARKER, is_due, prune_cache
+from osimlite.base.reading import read_at_most
+from osimlite.base.records import dataclass
+from osimlite.errors import OsimliteError
+
+RESULT_ENDINGS = (".sto", ".mot", ".trc", ".osim", ".xml", ".omoco", ".csv", ".txt")
+"""Endings of names that a document may give to a new file: no other program runs such files."""
+
+BEGINNING = 65_536
+"""Bytes of an existing file that are read to see what it is."""
+
+_PROJECT_MARKS = (".git", "osimlite.toml", "pyproject.toml")
+"""Names whose presence marks the top folder of a project."""
+
+
+class WriteRefusedError(OsimliteError):
+    """A document names a file as output that must not be written without the user's word."""
+
+
+def expect_folder_of(path: str | Path) -> None:
+    """Say before long work that a file cannot be written because its folder is not there.
+
+    Raises:
+        OsimliteError: it is not.
+    """
+    if not os.path.isdir(os.path.dirname(os.path.realpath(path))):
+        raise _nowhere(path)
+
+
+def _nowhere(path: str | Path) -> OsimliteError:
+    return OsimliteError("cannot write here: the folder does not exist", file=str(path))
+
+
+def write_atomically(path: str | Path, content: str | bytes) -> None:
+    """Write a file beside its place and move it there.
+
+    Raises:
+        OsimliteError: the folder is missing or cannot be written to; nothing has changed then.
+    """
+    with written_atomically(path) as stream:
+        stream.write(_encode(content, path) if isinstance(content, str) else content)
+
+
+def _encode(content: str, path: str | Path) -> bytes:
+    try:
+        return content.encode()
+    except UnicodeEncodeError as error:
+        # Half of a character: JSON can hold it, UTF-8 cannot.
+        odd = content[max(0, error.start - 20) : error.end]
+        raise OsimliteError(f"cannot write the file: '{odd}' ends in half a character", file=str(path)) from None
+
+
+@contextmanager
+def written_atomically(path: str | Path) -> Iterator[BinaryIO]:
+    """Yield a stream whose content becomes the file that the user named when all is written.
+
+    A file that was there keeps its owner, its mode and all of its names. A link stays a link to the
+    file that is written. A pipe or a device takes the text as it is.
+
+    Raises:
+        OsimliteError: the folder is missing or cannot be written to, or the path is a link that leads
+            out of its project; nothing has changed then.
+    """
+    target = Path(os.path.realpath(path))
+    # Unlike those of Path, these functions take a name that is too long for a file.
+    exists = os.path.exists(target)
+    if exists and not target.is_file():
+        with _open_special(target) as stream:
+            yield stream
+        return
+    _expect_link_inside(path, target)
+    with _stage(target, target.stat() if exists else None) as stream:
+        yield stream
+
+
+@contextmanager
+def written_into(folder: str | Path, name: str) -> Iterator[BinaryIO]:
+    """Yield a stream whose content becomes a file in a folder, under a name that the program chose.
+
+    The new file takes the place of a regular file or of a link; what the link led to stays as it is.
+
+    Raises:
+        OsimliteError: the folder is missing or cannot be written to, or something else than a regular
+            file has the name; nothing has changed then.
+    """
+    target = Path(os.path.realpath(folder)) / name
+    _expect_regular_or_none(target)
+    there = target.lstat() if os.path.isfile(target) and not target.is_symlink() else None
+    with _stage(target, there, in_place=False) as stream:
+        yield stream
+
+
+def write_into(folder: str | Path, name: str, content: str | bytes) -> Path:
+    """Write a file in a folder under a name that the program chose, and return its path.
+
+    Raises:
+        OsimliteError: as of :func:`written_into`.
+    """
+    path = Path(folder) / name
+    with written_into(folder, name) as stream:
+        stream.write(_encode(content, path) if isinstance(content, str) else content)
+    return path
+
+
+def user_cache_folder() -> Path | None:
+    """Return the folder of osimlite where programs of this user keep their caches; None without a home."""
+    try:
+        home = Path.home()
+    except RuntimeError:
+        # The system knows no home of this user, as in some containers.
+        home = None
+    # By its specification a relative path is invalid; it would lead into a stranger's folder.
+    variable = "LOCALAPPDATA" if sys.platform == "win32" else "XDG_CACHE_HOME"
+    named = os.environ.get(variable, "")
+    if os.path.isabs(named) and sys.platform != "darwin":
+        folder = Path(named, "osimlite")
+    elif home is None:
+        return None
+    elif sys.platform == "darwin":
+        return home / "Library" / "Caches" / "osimlite"
+    else:
+        folder = home / ("" if sys.platform == "win32" else ".cache") / "osimlite"
+    return folder / "cache" if sys.platform == "win32" else folder
+
+
+def write_cached(path: Path, content: str | bytes) -> None:
+    """Write an entry of a cache, and make its folder; the entry is left out if that is not possible.
+
+    Once a day entries that were not used for long are removed first.
+    """
+    with suppress(OSError, OsimliteError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        folder = user_cache_folder()
+        if folder is not None and folder in path.parents:
+            _prune_daily(folder)
+        write_into(path.parent, path.name, content)
+
+
+def _prune_daily(folder: Path) -> None:
+    """Remove old entries of the user's cache, unless this was done in the last day."""
+    now = time.time()
+    if is_due(folder, now):
+        # The mark comes first: processes that start meanwhile need not do the same.
+        write_into(folder, MARKER, "")
+        prune_cache(folder, now)
+
+
+def open_to_append(path: Path) -> BinaryIO:
+    """Open a regular file for appending, or make it; a link or a pipe under its name is refused.
+
+    Raises:
+        OSError: it cannot be opened.
+        OsimliteError: something else than a regular file has the name.
+    """
+    _expect_regular_or_none(path, links=False)
+    flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT
+    flags |= sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
+    return open(os.open(path, flags, 0o666), "ab")
+
+
+def expect_folder_inside(folder: Path) -> None:
+    """Refuse a folder that the program chose in the current folder and that is a link out of it.
+
+    Raises:
+        OsimliteError: it is such a link.
+    """
+    if os.path.islink(folder) and not _is_inside(os.path.realpath(folder), [os.getcwd()]):
+        raise OsimliteError(
+            f"the results would go through this link to '{os.path.realpath(folder)}', out of the "
+            "current folder; name a folder with -o",
+            file=str(folder),
+        )
+
+
+@dataclass(frozen=True)
+class ResultWriter:
+    """Decides about files that a document names as its results."""
+
+    trees: tuple[str, ...]  # real paths of the folders in whose trees files may be written
+    overwrite: bool = False  # whether any regular file or link may be replaced
+    outside: bool = False  # whether files may be written outside of the trees
+
+    @classmethod
+    def for_document(
+        cls,
+        document: str | Path,
+        output: str | Path | None = None,
+        *,
+        overwrite: bool = False,
+        outside: bool = False,
+    ) -> ResultWriter:
+        """Return the writer for the results of a document.
+
+        Args:
+            document: the file that names the results.
+            output: the folder that the user named for all of them; None if the document decides.
+            overwrite: whether any regular file or link may be replaced.
+            outside: whether files may be written outside of the trees of the project and the
+                current folder.
+        """
+        folders = [project_folder(document), os.getcwd()] if output is None else [output]
+        trees = tuple(dict.fromkeys(map(os.path.realpath, folders)))
+        return cls(trees, overwrite, outside)
+
+    def resolve(self, path: str | Path) -> Path:
+        """Return the real path of a result, after checking all that depends on its name alone.
+
+        Raises:
+            WriteRefusedError: the path leads out of the trees, is hidden, is a link, or its ending is
+                not that of a result.
+        """
+        path = Path(path)
+        real = Path(os.path.realpath(path.parent)) / path.name
+        if "\0" in str(path) or path.name in ("", ".", ".."):
+            raise WriteRefusedError("a result needs the name of a file", file=str(path))
+        tree = next((tree for tree in self.trees if _is_inside(real, [tree])), None)
+        if tree is None and not self.outside:
+            folders = " and ".join(f"'{tree}'" for tree in self.trees)
+            raise WriteRefusedError(
+                f"the document names a result outside of {folders}; to write there, use "
+                "--write-outside, or name another folder with -o",
+                file=str(real),
+            )
+        inner = real.relative_to(tree) if tree is not None else Path(real.name)
+        if any(part.startswith(".") for part in inner.parts):
+            raise WriteRefusedError(
+                "the document names a hidden file as a result, which is never written; use another name",
+                file=str(real),
+            )
+        if self.overwrite:
+            return real
+        # os.path.islink is false, without an error, where a name is too long; writing then says so.
+        if os.path.islink(real):
+            raise WriteRefusedError(
+                "the document names a link as a result, and results are not written through links; "
+                "remove it, or replace it with --overwrite",
+                file=str(path),
+            )
+        # OpenSim gives tables of a tool that is called `v1.2` no ending: `v1.2_states`.
+        is_numbered = real.suffix[1:2].isdigit()
+        if not is_numbered and not real.name.lower().endswith(RESULT_ENDINGS):
+            raise WriteRefusedError(
+                f"the name of a result ends in {', '.join(RESULT_ENDINGS[:-1])} or "
+                f"{RESULT_ENDINGS[-1]}; use such a name, or --overwrite",
+                file=str(real),
+            )
+        return real
+
+    def expect_replaceable(self, path: Path, beginning: bytes) -> None:
+        """Refuse to replace what is not a result of the same kind.
+
+        Args:
+            path: real path of the result.
+            beginning: the first bytes of what is to be written.
+
+        Raises:
+            WriteRefusedError: something else is there.
+        """
+        _expect_regular_or_none(path)
+        if self.overwrite or not os.path.lexists(path):
+            return
+        there, kind = read_at_most(path, BEGINNING), kind_of(beginning)
+        if there and not _are_alike(kind_of(there), kind):
+            raise WriteRefusedError(
+                f"a result would replace this file, which is not {kind or 'such a text'}; move it, "
+                "let the document name another file, or replace it with --overwrite",
+                file=str(path),
+            )
+
+    @contextmanager
+    def written(self, path: str | Path, lines: Iterable[str]) -> Iterator[BinaryIO]:
+        """Write a result beside its place; it takes its place when the context ends without an error.
+
+        Args:
+            path: as the document names it.
+            lines: the text in parts.
+
+        Raises:
+            WriteRefusedError: the file may not be written.
+            OsimliteError: it cannot be written.
+        """
+        real = self.resolve(path)
+        parts = iter(lines)
+        first = b""
+        # The parts of a table may be its lines, and its head says what it is.
+        for part in parts:
+            first += _encode(part, real)
+            if len(first) >= BEGINNING:
+                break
+        self.expect_replaceable(real, first)
+        make_folder(real.parent)
+        with written_into(real.parent, real.name) as stream:
+            stream.write(first)
+            stream.writelines(_encode(part, real) for part in parts)
+            stream.close()
+            yield stream
+
+
+def project_folder(document: str | Path) -> str:
+    """Return the top folder of the project that a document belongs to.
+
+    It is the nearest folder above that has `.git`, `osimlite.toml` or `pyproject.toml`. Without one it
+    is the folder around the document's, because laboratories keep setups and results side by side
+    (`../results`). It is never the home folder, the temporary folder or what is above one of them.
+    """
+    folder = Path(os.path.realpath(document)).parent
+    shared = find_shared_folders()
+    if (marked := _find_marked_folder(folder, shared)) is not None:
+        return marked
+    around = folder.parent
+    return str(folder if str(around) in shared else around)
+
+
+UNNAMED_TABLE = "a table 'UNKNOWN' of OpenSim"
+"""The kind of a table to which OpenSim gave no name, as RRA and CMC do with their states."""
+
+
+def _are_alike(present: str | None, new: str | None) -> bool:
+    """Return whether a result of one kind may take the place of a text of another."""
+    if present is None or new is None:
+        return False
+    is_table = present == UNNAMED_TABLE and new.startswith("a table '")
+    return present == new or is_table
+
+
+def kind_of(beginning: bytes) -> str | None:
+    """Return what a text is, in words, by its beginning; None of what is no result of a tool.
+
+    Args:
+        beginning: the first bytes, with the head of a table or the first element of a document.
+    """
+    if b"\0" in beginning:
+        return None
+    text = beginning.decode("utf-8", "replace").lstrip("\ufeff")
+    if document := _DOCUMENT.match(text):
+        return f"an OpenSim document with <{document[1]}>"
+    first = text.partition("\n")[0]
+    if first.startswith("PathFileType"):
+        return "a table of markers"
+    head, end, _ = text.partition("endheader")
+    if end and re.search(r"^(version|nRows|datarows|DataType) *=", head, re.MULTILINE | re.IGNORECASE):
+        name = "" if "=" in first else first.strip()
+        return f"a table '{name}' of OpenSim"
+    if _RESIDUALS.match(text):
+        return "a list of residuals"
+    return None
+
+
+_DOCUMENT = re.compile(
+    r"\s*(?:<\?[^>]*>\s*|<!--(?:[^-]|-(?!->))*-->\s*)*<OpenSimDocument\b[^>]*>\s*"
+    r"(?:<!--(?:[^-]|-(?!->))*-->\s*)*<(\w+)"
+)
+_RESIDUALS = re.compile(r"Average Residuals:\s")
+
+
+def _lineage(folder: str | Path) -> tuple[Path, ...]:
+    path = Path(folder)
+    return (path, *path.parents)
+
+
+def find_shared_folders() -> set[str]:
+    """Return the folders that hold more than one project: home, the temporary one, and those above."""
+    import tempfile
+
+    places = [os.path.expanduser("~"), tempfile.gettempdir(), os.sep]
+    return {str(part) for place in places for part in _lineage(os.path.realpath(place))}
+
+
+def _find_marked_folder(folder: Path, shared: set[str]) -> str | None:
+    """Return the nearest folder above that is marked as the top of a project."""
+    for place in _lineage(folder):
+        if str(place) in shared:
+            return None
+        if any((place / mark).exists() for mark in _PROJECT_MARKS):
+            return str(place)
+    return None
+
+
+def _is_inside(path: str | Path, folders: Iterable[str | Path]) -> bool:
+    """Return whether a real path is in the tree of one of some folders."""
+    return any(Path(path).is_relative_to(os.path.realpath(folder)) for folder in folders)
+
+
+def _expect_link_inside(path: str | Path, target: Path) -> None:
+    """Refuse a link that leads out of its project, or without a project out of its folder."""
+    if not os.path.islink(path) or os.path.abspath(path).startswith(("/dev/", "/proc/")):
+        return
+    folder = Path(os.path.realpath(os.path.dirname(os.path.abspath(path))))
+    if not _is_inside(target, [_find_marked_folder(folder, find_shared_folders()) or folder]):
+        raise WriteRefusedError(
+            f"this is a link to '{target}', out of its project, and is not followed; name that file itself",
+            file=str(path),
+        )
+
+
+def _expect_regular_or_none(path: Path, *, links: bool = True) -> None:
+    """Refuse a path under which there is a folder, a pipe, a device or, unless allowed, a link."""
+    try:
+        mode = path.lstat().st_mode
+    except OSError:
+        return
+    if stat.S_ISREG(mode) or (links and stat.S_ISLNK(mode)):
+        return
+    kind = "a folder" if stat.S_ISDIR(mode) else "a link" if stat.S_ISLNK(mode) else "a pipe or a device"
+    raise OsimliteError(f"cannot write the file: this is {kind}; remove it first", file=str(path))
+
+
+@contextmanager
+def _stage(target: Path, there: os.stat_result | None, *, in_place: bool = True) -> Iterator[BinaryIO]:
+    """Yield a stream to a temporary file that replaces the target when the context ends.
+
+    Args:
+        target: the place.
+        there: what is there now; None if there is nothing, or what is to be replaced whatever it is.
+        in_place: whether a file with several names, or whose owner cannot be kept, is written into
+            instead of replaced.
+    """
+    # To those who may do everything the mode says it all the same.
+    if there is not None and not (there.st_mode & 0o222 and os.access(target, os.W_OK)):
+        raise OsimliteError("cannot write the file: it is read-only; make it writable first", file=str(target))
+    try:
+        from tempfile import mkstemp
+
+        handle, name = mkstemp(dir=target.parent, prefix=".osimlite-")
+    except OSError as error:
+        if isinstance(error, FileNotFoundError):
+            raise _nowhere(target) from None
+        raise OsimliteError(f"cannot write here: {error.strerror}", file=str(target)) from None
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            yield stream
+        if there is None:
+            Path(name).chmod(0o666 & ~_umask())
+        is_alike = there is None or _copy_attributes(name, target, there)
+        if not is_alike and not in_place and there is not None:
+            os.chmod(name, stat.S_IMODE(there.st_mode))
+            is_alike = True
+        replaces = is_alike and _replace_file(name, target)
+    except OSError as error:
+        Path(name).unlink(missing_ok=True)
+        raise OsimliteError(f"cannot write the file: {error.strerror}", file=str(target)) from None
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+    if not replaces:
+        _copy_into(name, target)
+
+
+def put_in_place(path: Path, target: Path) -> None:
+    """Replace a file by a finished one.
+
+    Raises:
+        OSError, OsimliteError: it cannot.
+    """
+    if not _replace_file(path, target):
+        _copy_into(path, target)
+
+
+def make_folder(path: str | Path) -> Path:
+    """Make a folder, and those above it, unless it is there.
+
+    Raises:
+        OsimliteError: it cannot be made; the message says why.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        file = next(
+            (place for place in (folder, *folder.parents) if os.path.exists(place) and not place.is_dir()), None
+        )
+        reason = "this is a file, not a folder" if file is not None else error.strerror
+        raise OsimliteError(f"cannot make a folder here: {reason}", file=str(file or folder)) from None
+    return folder
+
+
+@contextmanager
+def folder_to_fill(path: str | Path) -> Iterator[Path]:
+    """Make a folder before long work begins, and remove it if the work fails without a file.
+
+    Raises:
+        OsimliteError: it cannot be made or written to; the message says why.
+    """
+    is_new = not os.path.exists(path)
+    folder = make_folder(path)
+    if not os.access(folder, os.W_OK):
+        raise OsimliteError("cannot write here: permission denied", file=str(folder))
+    try:
+        yield folder
+    except BaseException:
+        if is_new:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
+
+
+@contextmanager
+def _open_special(target: Path) -> Iterator[BinaryIO]:
+    """Yield a stream into a pipe or a device, without waiting for a reader of the pipe."""
+    if target.is_dir():
+        raise OsimliteError("cannot write the file: this is a folder; name a file in it", file=str(target))
+    try:
+        handle = os.open(target, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
+        os.set_blocking(handle, True)
+        with open(handle, "wb") as stream:
+            yield stream
+    except OSError as error:
+        reason = "nobody reads this pipe" if error.errno == errno.ENXIO else error.strerror
+        raise OsimliteError(f"cannot write the file: {reason}", file=str(target)) from None
+
+
+def _copy_attributes(name: str, target: Path, there: os.stat_result) -> bool:
+    """Copy owner, mode and extended attributes to a new file; return whether all could be copied."""
+    if there.st_nlink > 1:
+        return False
+    try:
+        made = os.stat(name)
+        if (made.st_uid, made.st_gid) != (there.st_uid, there.st_gid):
+            os.chown(name, there.st_uid, there.st_gid)
+        os.chmod(name, stat.S_IMODE(there.st_mode))
+        if sys.platform == "linux":
+            for attribute in os.listxattr(target):
+                os.setxattr(name, attribute, os.getxattr(target, attribute))
+    except OSError:
+        return False
+    return True
+
+
+def _replace_file(name: str | Path, target: Path) -> bool:
+    """Replace a file; return False if the old one stays, as on Windows while a program has it open."""
+    try:
+        os.replace(name, target)
+    except PermissionError:
+        if not target.is_file():
+            raise
+        return False
+    return True
+
+
+def _copy_into(name: str | Path, target: Path) -> None:
+    """Write what is in one file into another, which stays itself, and remove the first.
+
+    Raises:
+        OsimliteError: it cannot be written whole; the first file is kept then.
+    """
+    import shutil
+
+    try:
+        with open(name, "rb") as source, target.open("r+b") as stream:
+            shutil.copyfileobj(source, stream)
+            stream.truncate()
+    except OSError as error:
+        raise OsimliteError(
+            f"cannot write the file: {error.strerror}; what was to be written is in {name}", file=str(target)
+        ) from None
+    os.unlink(name)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

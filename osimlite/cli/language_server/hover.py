@@ -1,0 +1,87 @@
+"""What an editor shows of the thing under the pointer."""
+
+from __future__ import annotations
+
+import os
+
+from lsprotocol import types
+
+from osimlite.base.files import from_folder
+from osimlite.cli.language_server.analysis import Analysis
+from osimlite.cli.language_server.cursor import Element
+from osimlite.cli.language_server.names import measured
+from osimlite.io.document.lexical import formatter
+from osimlite.lint.setup import Setup
+from osimlite.schema.base import Object
+from osimlite.schema.descriptions import described, meaning_of, value_of
+from osimlite.schema.fields import Held, Value
+from osimlite.schema.specs import FieldSpec
+from osimlite.schema.tree import is_a
+
+
+def hover(analysis: Analysis, offset: int) -> types.Hover | None:
+    """What stands at an offset: a class, a property with its type, unit and default, or what a name leads to."""
+    cursor = analysis.cursor(offset)
+    element = cursor.subject
+    if cursor.kind == "comment" or element is None:
+        return None
+    parts = []
+    if cursor.kind == "text" or cursor.attribute == "name":
+        parts.append(_led_to(analysis, offset))
+    if element.cls is not None:
+        parts.append(_class(element.cls))
+        if cursor.kind in ("tag", "closing tag"):
+            parts.insert(0, _path(analysis, element))
+    elif element.spec is not None:
+        around = cursor.around[-2:] if cursor.kind in ("text", "closing tag") else cursor.around[-1:]
+        parts.append(_property(element.spec, around[0].cls if around else None))
+    text = "\n\n".join(part for part in parts if part)
+    if not text:
+        return None
+    content = types.MarkupContent(types.MarkupKind.Markdown, text)
+    return types.Hover(content, analysis.text.range(cursor.start, max(cursor.end, cursor.start + 1)))
+
+
+def _class(cls: type[Object]) -> str:
+    return f"**{cls.tag}**\n\n{described(cls)}"
+
+
+def _property(spec: FieldSpec, owner: type[Object] | None) -> str:
+    head = f"**{spec.tag}**: {value_of(spec)}"
+    of = "" if owner is None else f"Property of {owner.tag}."
+    return "\n\n".join(part for part in (f"{head}{_default(spec)}", meaning_of(spec), of) if part)
+
+
+def _default(spec: FieldSpec) -> str:
+    if not isinstance(spec.kind, Value) or spec.default in (None, "", ()):
+        return ""
+    return f"; by default `{formatter(spec.kind, 'shortest')(spec.default)}`"
+
+
+def _led_to(analysis: Analysis, offset: int) -> str:
+    target = analysis.target_at(offset)
+    if target is None:
+        return ""
+    file = from_folder(target.file, os.path.dirname(analysis.file) or ".")
+    if target.item is None:
+        return f"In `{file}`, line {target.at.line}." if target.at is not None else f"File `{file}`."
+    said = f"{type(target.item).tag} `{target.path or target.item.name}`"
+    if target.file == analysis.file:
+        return said
+    data = measured(analysis.document) if isinstance(analysis.document, Setup) and is_a(target.item, "Marker") else None
+    also = f"; {'in' if target.item.name in data[1] else '**not** in'} `{data[0]}`" if data is not None else ""
+    return f"{said} of `{file}`{also}"
+
+
+def _path(analysis: Analysis, element: Element) -> str:
+    """The path of the component that an element is, if the text can be read."""
+    if analysis.tree is None:
+        return ""
+    item = analysis.objects.get(element.number)
+    path = None if item is None else analysis.tree.path_of(item)
+    return f"`{path}`" if path else ""
+
+
+def is_list(spec: FieldSpec) -> bool:
+    """Whether a property is an element around other objects."""
+    return isinstance(spec.kind, Held) and spec.kind.form in ("list", "optional")

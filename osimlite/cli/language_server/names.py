@@ -1,0 +1,140 @@
+"""The names that may stand at a place: of components, files, columns, states; with what each of them is."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from osimlite.base.files import from_folder
+from osimlite.cli.language_server.analysis import Analysis
+from osimlite.cli.language_server.cursor import Cursor, Element
+from osimlite.lint.beside import beginning, folders_in
+from osimlite.lint.setup import Setup
+from osimlite.schema.base import Component
+from osimlite.schema.fields import Reference
+from osimlite.schema.specs import FieldSpec, lineage
+from osimlite.schema.states import variables
+from osimlite.schema.tree import Tree, Use
+
+_OPAQUE = ("input", "positional", "point-index", "output-file", "input-folder", "output-folder", "pattern")
+"""Rules of references whose texts are no names of what is there."""
+_NAMED_AFTER = {
+    "Control": Reference("actuator-name", "Actuator"),
+    "MarkerWeight": Reference("marker-name", "Marker"),
+}
+"""What objects of a class are called after, although nothing says that they must be."""
+_TABLE = (".sto", ".mot")
+_SUFFIXES = {"Model": (".osim",), "marker data": (".trc", ".sto"), "table": _TABLE, "motion": _TABLE}
+"""How files of a content are called; others are documents."""
+
+
+class Name(NamedTuple):
+    """A text that would be right, what it leads to, and whether it is what is looked for more likely than others."""
+
+    text: str
+    detail: str = ""
+    likely: bool = True
+
+
+def reference_of(cursor: Cursor) -> Reference | None:
+    """What the name of the object whose tag is at a place leads to."""
+    cls = None if cursor.element is None else cursor.element.cls
+    if cls is None:
+        return None
+    # Of some classes only the property says so that holds them, or the set that they are in.
+    held = (element.spec.names for element in reversed(cursor.around[-2:]) if element.spec is not None)
+    said = next(filter(None, held), None)
+    after = (_NAMED_AFTER[name] for name in lineage(cls) if name in _NAMED_AFTER)
+    return said or cls.name_reference or next(after, None)
+
+
+def names(analysis: Analysis, cursor: Cursor, reference: Reference, holder: Element | None) -> Iterator[Name]:
+    """The texts that a reference may take in a place.
+
+    Args:
+        analysis: of the last version of the document that could be read.
+        cursor: the place.
+        reference: that stands there.
+        holder: the element that has it.
+    """
+    setup = analysis.document if isinstance(analysis.document, Setup) else None
+    if reference.rule == "file":
+        yield from _files(os.path.dirname(analysis.file), reference.target.removesuffix(" file").partition(" or ")[0])
+    elif reference.rule == "column":
+        table = None if setup is None else setup.table(getattr(setup.top, "datafile", ""))
+        columns = [] if table is None else table.columns
+        for prefix in dict.fromkeys(column[:-1] for column in columns if column[-1:] in "xyzXYZ"):
+            yield Name(prefix, " ".join(column for column in columns if column.startswith(prefix)))
+    elif analysis.tree is not None and reference.rule not in _OPAQUE:
+        if setup is None:
+            yield from _components(analysis.tree, reference, _owner(analysis, analysis.tree, holder))
+        elif reference.rule == "state-path":
+            for text, component in variables(analysis.tree, reference.target).items():
+                yield Name(text, type(component).tag)
+        else:
+            yield from map(Name, sorted(reference.words))
+            yield from _in_tool(setup, analysis.tree, reference)
+
+
+def _owner(analysis: Analysis, tree: Tree, holder: Element | None) -> Component:
+    """The component of a model from which names are looked up."""
+    if holder is None:
+        return tree.model
+    item = analysis.objects.get(holder.number)
+    if (item is None or type(item) is not holder.cls) and holder.given:
+        # Elements before it may have come and gone since; its name tells which it is.
+        item = next((c for c in tree.components if c.name == holder.given and type(c) is holder.cls), None)
+    return tree.model if item is None else tree.owner_of(item)
+
+
+def _components(tree: Tree, reference: Reference, owner: Component) -> Iterator[Name]:
+    spec = FieldSpec("", "", reference, None, None, None, (type(owner),))
+    for text in tree.spellings(Use(owner, owner, spec, "")):
+        target = tree.lookup(reference, text, owner).target
+        yield Name(text, "" if target is None else f"{type(target).tag} {tree.path_of(target)}")
+
+
+def _in_tool(setup: Setup, tree: Tree, reference: Reference) -> Iterator[Name]:
+    """Names in the model of the tool and in what the tool adds to it; those that were measured are the likely ones."""
+    if reference.rule == "set-member":
+        known = [Name(text) for text in sorted(setup.names_of(reference.target))]
+    else:
+        known = list(_components(tree, reference, tree.model))
+        added = setup.names_of(reference.target) - {name.text for name in known} if setup.added else set()
+        known += [Name(text, reference.target) for text in sorted(added) if not reference.rule.endswith("path")]
+    table = measured(setup) if reference.target in ("Marker", "PhysicalFrame", "Coordinate") else None
+    for name in known:
+        if table is None or reference.target != "Marker":
+            yield name
+        else:
+            has = name.text in table[1]
+            yield Name(name.text, f"{name.detail}, {'in' if has else 'not in'} {table[0]}", has)
+
+
+def measured(setup: Setup) -> tuple[str, list[str]] | None:
+    """The file of the markers that the tool is given, and their labels; None if there is none."""
+    for item in setup.tool[1].walk() if setup.tool is not None else ():
+        name = str(getattr(item, "marker_file", "")).strip()
+        table = setup.table_of_tool(name)
+        if table is not None:
+            return name, table.columns
+    return None
+
+
+def _files(folder: str, content: str) -> Iterator[Name]:
+    """The files in a folder and in those below it that may hold something."""
+    suffixes = _SUFFIXES.get(content, (".xml",))
+    for place in (folder, *map(str, folders_in(Path(folder))[:50])):
+        for path in _listed(place, suffixes):
+            likely = content in _SUFFIXES or f"<{content}".encode() in beginning(path)
+            yield Name(from_folder(path, folder), content if likely else "", likely)
+
+
+def _listed(folder: str, suffixes: tuple[str, ...]) -> list[str]:
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entry.path for entry in entries if entry.name.lower().endswith(suffixes))
+    except OSError:
+        return []

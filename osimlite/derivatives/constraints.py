@@ -1,0 +1,108 @@
+"""Accelerations under constraints as formulas: which equations count is decided when the functions are made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from osimlite.derivatives.symbolic import on_symbols
+from osimlite.derivatives.symbols import Vector, casadi
+from osimlite.mechanics.kernels.constrained_dynamics import away_from_ground, bind, toward_ground
+from osimlite.mechanics.kernels.dynamics import evaluate, solve
+from osimlite.mechanics.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, MODEL, OUTCOME, STAGE
+from osimlite.mechanics.kernels.least_squares import REDUNDANT
+from osimlite.mechanics.kernels.pointers import Law
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.simulation.constrained import kept_state
+from osimlite.simulation.engines.linking import PYTHON, Program
+from osimlite.simulation.pack import Packed
+from osimlite.simulation.states import StateLayout
+
+POSES = 3
+"""In so many poses is looked which equations follow from others."""
+
+
+def position_equations(structure: Sequence[int]) -> list[int]:
+    """Numbers of the equations that bind positions, in the order of their errors."""
+    h = structure[structure[MODEL.CONSTRAINED] :]
+    records = structure[h[CONSTRAINED.CONSTRAINT_AT] :][: h[CONSTRAINED.CONSTRAINTS]]
+    ranges = (
+        (structure[at + CONSTRAINT.FIRST_EQUATION], structure[at + CONSTRAINT.END_POSITION], k)
+        for k, at in enumerate(records)
+    )
+    return [row for first, end, _ in ranges for row in range(first, end)]
+
+
+def independent_equations(mechanism: Mechanism, packed: Packed, state: StateLayout) -> list[int]:
+    """Numbers of as many equations as say something beyond others, where the constraints hold.
+
+    Raises:
+        SimulationError: no pose fulfils the constraints.
+    """
+    ints, size = Program(packed, PYTHON).ints, len(packed.order)
+    ints[MODEL.CONTROLS] = 0
+    count = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.EQUATIONS])
+    at_rows = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS])
+    best: list[int] = []
+    rng = np.random.default_rng(0)
+    infos = mechanism.coordinates
+    start = np.array([info.default_value for info in infos])
+    for number in range(POSES):
+        q = start + (0.05 * rng.normal(size=len(start)) if number else 0.0)
+        values, speeds = kept_state(mechanism, q.tolist(), [0.0] * len(infos), (), ())
+        y = np.array(state.pack(values.tolist(), speeds.tolist()))
+        w, f = np.zeros(int(ints[MODEL.WORK_SIZE])), np.zeros(len(y))
+        evaluate(ints, packed.numbers, w, y, f, STAGE.VELOCITY)
+        bind(ints, packed.numbers, w, y, f)
+        rows = _independent(w[at_rows : at_rows + count * size].reshape(count, size))
+        best = max(best, rows, key=len)
+    return sorted(best)
+
+
+def _independent(rows: Array) -> list[int]:
+    """The longest rest first, of equations that weigh the same."""
+    lengths = np.linalg.norm(rows, axis=1)
+    rest = rows / np.where(lengths > REDUNDANT * max(lengths.max(initial=0.0), 1.0), lengths, np.inf)[:, None]
+    chosen: list[int] = []
+    for _ in range(min(rows.shape)):
+        left = np.linalg.norm(rest, axis=1)
+        k = int(np.argmax(left))
+        if left[k] < REDUNDANT:
+            break
+        chosen.append(k)
+        direction = rest[k] / left[k]
+        rest = rest - np.outer(rest @ direction, direction)
+    return chosen
+
+
+def dynamics_with(equations: Sequence[int]) -> Law:
+    """The law of accelerations that fulfil some of the equations, which all others follow from.
+
+    As in `by_multipliers`: the tree's own factor of the mass matrix gives what each equation's force does.
+    """
+
+    def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector, unused: int) -> int:
+        h, size = model.rest(model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
+        right, freedoms = f.rest(size), model.rest(model[MODEL.DOF_AT])
+        on_symbols(bind)(model, reals, data, y, f)
+        on_symbols(solve)(model, data, right)
+        inverse = [1.0 / data[freedoms[DOF.SIZE * k + DOF.ROW]] for k in range(size)]
+        rows, missing = [], []
+        for number in equations:
+            row = [data[h[CONSTRAINED.WORK_ROWS] + size * number + k] for k in range(size)]
+            missing.append(data[h[CONSTRAINED.WORK_DRIFTS] + number] - sum(a * right[k] for k, a in enumerate(row)))
+            turned = Vector(row)
+            on_symbols(toward_ground)(model, data, turned)
+            rows.append(casadi.horzcat(*turned.cells))
+        g = casadi.sparsify(casadi.SX(casadi.vertcat(*rows)))
+        scaled = g @ casadi.diag(casadi.vertcat(*inverse))
+        multipliers = casadi.ldl_solve(casadi.SX(casadi.vertcat(*missing)), *casadi.ldl(scaled @ g.T))
+        push = Vector(casadi.vertsplit(casadi.densify(scaled.T @ multipliers)))
+        on_symbols(away_from_ground)(model, data, push)
+        for k in range(size):
+            right[k] += push[k]
+        return OUTCOME.OK
+
+    return law  # type: ignore[return-value]

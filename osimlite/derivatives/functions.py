@@ -1,0 +1,462 @@
+"""A model as functions of CasADi: values and exact derivatives for optimisation and analysis."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from osimlite.base.files import make_folder
+from osimlite.base.text import did_you_mean
+from osimlite.base.writing import write_into
+from osimlite.derivatives.stated import StatedModel
+from osimlite.derivatives.tangents import TangentModel
+from osimlite.errors import SettingError, UnsupportedError
+from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, STAGE
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.model import Model, expect_model
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.probe import DeclaredProbe
+from osimlite.simulation.pack import Packed, pack
+from osimlite.simulation.states import in_model_order
+
+if TYPE_CHECKING:
+    from osimlite.derivatives.given_paths import SearchedPaths
+    from osimlite.derivatives.traced import Evaluated, Traced
+
+FUNCTIONS = "dynamics", "residual", "constraints", "outputs", "paths"
+"""Those that `save` writes."""
+
+
+def casadi(model: Model, parameters: Iterable[str] = (), folder: str | Path | None = None) -> CasadiModel:
+    """A model as functions of CasADi, made of the same laws that simulate it.
+
+    Args:
+        model: what moves.
+        parameters: numbers of the model that stay symbols, by path: ``/bodyset/torso/mass``, ``/forceset/soleus_r/
+            max_isometric_force``, ``/bodyset/torso/mass_center/1``; one path may stand for several that are the same.
+        folder: where the model's file is, for the files that it names; the folder that the program runs in if None.
+
+    Raises:
+        MissingDependency: casadi is not installed, or cannot be loaded beside what is loaded already.
+        ModelError: the model is not a mechanism.
+        SettingError: there is no such number.
+        UnsupportedError: a part of the model has no formula, or a number cannot stay a symbol; the message names it.
+    """
+    expect_model(model)
+    return CasadiModel(model, tuple(parameters), Path(folder or "."))
+
+
+class CasadiModel(StatedModel):
+    """Functions of CasADi (``casadi.Function``), each made when it is first asked for.
+
+    All are functions of columns: time t (s); the state x, named by `states`; its derivative xdot; the controls u of the
+    actuators, named by `controls`, in the place of what the model's controllers say (to which a stretch reflex adds);
+    the parameters p, named by `parameters`. Units are those of OpenSim's files of states: m, rad, s, N.
+    Where a result does not exist (a joint stands where its rates are not defined), it is not a number.
+
+    The arguments and attributes are those of :class:`osimlite.derivatives.stated.StatedModel`, and:
+
+    Args:
+        loads_given: whether t has, behind the time, what the functions of time of measured and prescribed forces are
+            then (`loads`; of a model with parameters it has none): thousands of knots are no formula to look through.
+    """
+
+    def __init__(
+        self, model: Model, parameters: Sequence[str], folder: Path, *, apart: bool = False, loads_given: bool = False
+    ) -> None:
+        # Before all else: it says what is missing.
+        from osimlite.derivatives.symbols import casadi as library
+        from osimlite.derivatives.traced import given_loads
+
+        self._library = library
+        super().__init__(model, parameters, folder, apart=apart)
+        self.loads = given_loads(self.forces.elements) if loads_given and not parameters else []
+        self._symbols = {
+            "t": library.SX.sym("t", 1 + len(self.loads)),
+            "x": library.SX.sym("x", len(self.states)),
+            "xdot": library.SX.sym("xdot", len(self.states)),
+            "u": library.SX.sym("u", len(self.controls)),
+            "p": library.SX.sym("p", len(self.parameters)),
+            "multipliers": library.SX.sym("multipliers", self.constraints_kept),
+            "paths": library.SX.sym("paths", self._searched.size),
+        }
+        self._searched.name(self._entries("paths"))
+        self._measured = self._searched.function() if self._searched.size else None
+        # What has no formula is refused at once.
+        self._traced  # noqa: B018
+
+    def _forces_of(self, model: Model, mechanism: Mechanism) -> Forces:
+        self._searched = self._searched_of(model, mechanism)
+        return self._searched.forces
+
+    def _searched_of(self, model: Model, mechanism: Mechanism) -> SearchedPaths:
+        """The forces, and those of their paths whose way is searched for."""
+        from osimlite.derivatives.given_paths import SearchedPaths
+
+        infos = mechanism.coordinates
+        moving = [k for k, info in enumerate(infos) if not info.locked]
+        paths = in_model_order(model, [f"{infos[k].path}/value" for k in moving])
+        places = {f"{infos[k].path}/value": k for k in moving}
+        return SearchedPaths(mechanism, super()._forces_of(model, mechanism), [places[path] for path in paths])
+
+    @property
+    def searched(self) -> tuple[str, ...]:
+        """Paths of the forces along paths around surfaces, whose way is searched for."""
+        return self._searched.names
+
+    def _numbers_of(self, changed: Model) -> Array:
+        mechanism = build_mechanism(changed)
+        searched = self._searched_of(changed, mechanism)
+        packed = pack(mechanism, searched.forces, apart=self._apart)
+        if not np.array_equal(packed.structure, self._packed.structure):
+            return np.zeros(0)
+        # Ways that are searched for may not change: lengths are no lines over anything.
+        ways = [searched.measured(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)] if searched.size else []
+        return np.concatenate((packed.numbers, *_fixed_numbers(mechanism, packed), *ways))
+
+    @cached_property
+    def in_tangents(self) -> TangentModel:
+        """The same in machine code, with the values that the parameters have here."""
+        result = TangentModel(self._model, self.parameters, self._folder)
+        result.take(self.p)
+        return result
+
+    # ----------------------------------------------------------------------------------------------- tracing
+    @cached_property
+    def _traced(self) -> Traced:
+        from osimlite.derivatives.constraints import independent_equations
+        from osimlite.derivatives.parameters import filled
+        from osimlite.derivatives.traced import Traced
+
+        numbers = self._packed.numbers.tolist()
+        if self._parameters:
+            numbers = filled(self._parameters.base.tolist(), self._parameters.slopes, self._entries("p"))
+        equations = independent_equations(self.mechanism, self._packed, self._state) if self.constraints_kept else ()
+        return Traced(
+            self._packed,
+            self.forces,
+            numbers,
+            self._symbols["t"][0],
+            self._engine_order("x"),
+            self._entries("u"),
+            equations,
+            self._entries("t")[1:],
+        )
+
+    def _entries(self, name: str) -> list[Any]:
+        symbol = self._symbols[name]
+        return [symbol[k] for k in range(symbol.numel())]
+
+    def _engine_order(self, name: str) -> list[Any]:
+        result: list[Any] = [0.0] * len(self.states)
+        for place, entry in zip(self.state_indices, self._entries(name), strict=True):
+            result[place] = entry
+        return result
+
+    def _in_order(self, y: Sequence[Any]) -> list[Any]:
+        return [y[place] for place in self.state_indices]
+
+    @cached_property
+    def _evaluated(self) -> Evaluated:
+        return self._traced.evaluated(STAGE.ACCELERATION)
+
+    def _function(self, name: str, given: Sequence[str], results: dict[str, Any]) -> Any:
+        symbols = [self._symbols[item] for item in given]
+        if self._measured is None or "x" not in given:
+            return self._library.Function(name, symbols, [*results.values()], [*given], [*results])
+        inner = self._library.Function(f"{name}_of_paths", [*symbols, self._symbols["paths"]], [*results.values()])
+        outer = self._arguments(given)
+        found = inner(*outer, self._measured(outer[given.index("x")][: len(self.coordinates)]))
+        return self._library.Function(name, outer, [*found] if len(results) > 1 else [found], [*given], [*results])
+
+    def _arguments(self, given: Sequence[str]) -> list[Any]:
+        """Symbols for the arguments of a function: of expressions, if one of its parts is none."""
+        kind = self._library.SX if self._measured is None else self._library.MX
+        return [kind.sym(name, self._symbols[name].numel()) for name in given]
+
+    # --------------------------------------------------------------------------------------------- functions
+    @cached_property
+    def dynamics(self) -> Any:
+        """``dynamics(t, x, u, p) -> xdot``: the derivative of the state."""
+        found = self._evaluated
+        return self._function("dynamics", ("t", "x", "u", "p"), {"xdot": found.sure(self._in_order(found.f.cells))})
+
+    @cached_property
+    def linear(self) -> Any:
+        """``linear(t, x, u, p) -> xdot, A, B``: the same with its exact derivatives by the state and the controls."""
+        given = "t", "x", "u", "p"
+        symbols = self._arguments(given)
+        xdot = self.dynamics(*symbols)
+        slopes = [self._library.jacobian(xdot, symbols[given.index(name)]) for name in ("x", "u")]
+        return self._library.Function("linear", symbols, [xdot, *slopes], [*given], ["xdot", "A", "B"])
+
+    @cached_property
+    def residual(self) -> Any:
+        """``residual(t, x, xdot, u, p, multipliers) -> residual``: zero where a motion is one of the model.
+
+        In the order of the state: what the rates of values are beyond those that follow from the speeds (rad/s, m/s);
+        the generalized forces M udot + c - f + Gᵀ multipliers (N, N m); what the rates of auxiliary states are beyond
+        those that the laws give. The multipliers (N, N m) are those of the rows of G in `constraints`; none without.
+        """
+        size, xdot = len(self.coordinates), self._engine_order("xdot")
+        found = self._traced.missing(xdot[size : 2 * size])
+        f = found.f.cells
+        rows = [given - own for given, own in zip(xdot, f, strict=True)]
+        rows[size : 2 * size] = f[size : 2 * size]
+        if self.constraints_kept:
+            push = self._bound["jacobian"].T @ self._symbols["multipliers"]
+            rows[size : 2 * size] = [rows[size + k] + push[self._speed_place(k)] for k in range(size)]
+        given = "t", "x", "xdot", "u", "p", "multipliers"
+        return self._function("residual", given, {"residual": found.sure(self._in_order(rows))})
+
+    def _speed_place(self, k: int) -> int:
+        """Number among `coordinates` of a degree of freedom."""
+        return self.state_indices.index(k)
+
+    def generalized_forces(self, pushing: Collection[str]) -> Any:
+        """``generalized_forces(t, x, xdot, u, p) -> missing``: M udot + c less what gravity and some forces push.
+
+        Args:
+            pushing: paths of the forces.
+
+        Returns:
+            A ``casadi.Function`` whose result (k, 1) is in the order of `coordinates`, N and N m; constraints do not
+            push.
+        """
+        size, xdot = len(self.coordinates), self._engine_order("xdot")
+        found = self._traced.missing(xdot[size : 2 * size], pushing)
+        forces = self._in_order(found.f.cells)[size : 2 * size]
+        return self._function("generalized_forces", ("t", "x", "xdot", "u", "p"), {"missing": found.sure(forces)})
+
+    def joint_load(self, path: str, side: str) -> Any:
+        """``joint_load(t, x, xdot, u, p, multipliers) -> force, moment``: what a joint pushes one of its bodies with.
+
+        It is what all that the joint carries lacks for its accelerations; the multipliers are those of `residual`.
+
+        Args:
+            path: of the joint.
+            side: ``child`` or ``parent``.
+
+        Returns:
+            A ``casadi.Function`` of the force (3,), N, and the moment (3,), N m, about the origin of the joint's frame
+            on that side, along the axes of ground.
+        """
+        from osimlite.derivatives.outputs import frame_places, joint_load_columns
+
+        bodies, placements = self.mechanism.bodies, self._packed.placements
+        body = next(body for body in bodies if body.mobilizer.joint == path)
+        link = placements[bodies.index(body)].link
+        if link == (GROUND if body.parent == GROUND else placements[body.parent].link):
+            own = CasadiModel(self._model, self.parameters, self._folder, apart=True, loads_given=bool(self.loads))
+            return own.joint_load(path, side)
+        # The body that the joint carries in the tree gets what is missing there, the other one the opposite.
+        sign = 1.0 if (side == "child") != body.mobilizer.reversed else -1.0
+        size, xdot = len(self.coordinates), self._engine_order("xdot")
+        found = self._traced.missing(xdot[size : 2 * size])
+        pushes = []
+        if self.constraints_kept:
+            multipliers = self._entries("multipliers")
+            pushes = [(of, multipliers[row], unit) for (row, of), unit in self._traced.bound().result.items()]
+        joint: Any = self._model.find(path)
+        frame = self._model.tree().target(joint, f"socket_{side}_frame", getattr(joint, f"socket_{side}_frame")).path
+        places = frame_places(self.mechanism, self._packed)
+        number = [*places].index(frame)
+        origin = places[frame][0], self._fixed[1][12 * number + 9 : 12 * number + 12]
+        given = "t", "x", "xdot", "u", "p", "multipliers"
+        return self._function("joint_load", given, joint_load_columns(found, link, origin, sign, pushes))
+
+    @cached_property
+    def constraints(self) -> Any:
+        """``constraints(t, x, xdot, p) -> position, velocity, acceleration, jacobian``: zero where they hold.
+
+        The errors of the equations that bind positions (rad, m), of all in speeds (G u less what it is to be), and in
+        accelerations (likewise G udot); G (m, n) has a row for each equation and a column for each of `coordinates`.
+        """
+        return self._function("constraints", ("t", "x", "xdot", "p"), self._bound)
+
+    @cached_property
+    def _bound(self) -> dict[str, Any]:
+        from osimlite.derivatives.constraints import position_equations
+
+        size, count, column = len(self.coordinates), self.constraints_kept, self._library.vertcat
+        if not count:
+            nothing = self._library.SX(0, 1)
+            empty = self._library.SX(0, size)
+            return {"position": nothing, "velocity": nothing, "acceleration": nothing, "jacobian": empty}
+        found, structure = self._traced.bound(), self._traced.structure
+        h, data = structure[structure[MODEL.CONSTRAINED] :], found.data
+        order = [self.state_indices.index(k) for k in range(size)]
+        rows = []
+        for number in range(count):
+            first = h[CONSTRAINED.WORK_ROWS] + size * number
+            row = [0.0] * size
+            for k, place in enumerate(order):
+                row[place] = data[first + k]
+            rows.append(self._library.horzcat(*row))
+        jacobian = self._library.sparsify(self._library.SX(column(*rows)))
+        u, udot = self._symbols["x"][size : 2 * size], self._symbols["xdot"][size : 2 * size]
+
+        def wanted(place: int) -> Any:
+            return column(*data[h[place] : h[place] + count])
+
+        errors = [data[h[CONSTRAINED.WORK_ERRORS] + number] for number in position_equations(structure)]
+        return {
+            "position": self._library.SX(column(*errors)),
+            "velocity": jacobian @ u - wanted(CONSTRAINED.WORK_RATES),
+            "acceleration": jacobian @ udot - wanted(CONSTRAINED.WORK_DRIFTS),
+            "jacobian": jacobian,
+        }
+
+    @cached_property
+    def outputs(self) -> Any:
+        """``outputs(t, x, u, p) -> ...``: columns whose entries are named by `output_names`.
+
+        ``stations``, ``station_velocities``: of markers and other stations in ground (m, m/s); ``mass_center``,
+        ``mass_center_velocity``; ``contact_forces``: of each pair the force in ground (N) on the second surface, or on
+        the sphere, and its point (m); ``forces``: what is known of each force, such as ``tension`` (N), ``activation``,
+        ``fiber_length`` (m), ``cos_pennation``, ``active_fiber_force`` (N); ``probes``: what each probe finds times its
+        gain, before it is integrated or compared over time. Probes of energies and of joints are not among them.
+        """
+        return self._function(
+            "outputs", ("t", "x", "u", "p"), {key: column for key, (_, column) in self._outputs.items()}
+        )
+
+    @cached_property
+    def output_names(self) -> dict[str, tuple[str, ...]]:
+        """By the outputs of `outputs`, the names of their entries."""
+        return {name: tuple(labels) for name, (labels, _) in self._outputs.items()}
+
+    @cached_property
+    def _outputs(self) -> dict[str, tuple[list[str], Any]]:
+        from osimlite.derivatives.outputs import output_columns
+
+        found = self._evaluated
+        if any(isinstance(element, DeclaredProbe) for element in self.forces.elements):
+            found = self._traced.probed()
+        return output_columns(self.mechanism, self._packed, self.forces, found, self._fixed[0])
+
+    @cached_property
+    def _fixed(self) -> tuple[list[Any], list[Any]]:
+        """Points of stations, and axes and origins of frames, of which some may be symbols."""
+        stations, frames = (part.tolist() for part in _fixed_numbers(self.mechanism, self._packed))
+        if self._parameters:
+            first = len(self._packed.numbers)
+            second = first + len(stations)
+            numbers = [*self._traced.numbers]
+            stations, frames = numbers[first:second], numbers[second : second + len(frames)]
+        return stations, frames
+
+    def frames(self, paths: Iterable[str]) -> Any:
+        """``frames(t, x, p) -> position, rotation, velocity, angular_velocity``: of frames, in ground, a column each.
+
+        Args:
+            paths: of k frames.
+
+        Returns:
+            A ``casadi.Function``: origins (3, k) in m, rotation matrices (9, k) column by column, velocities of the
+            origins (3, k) in m/s, angular velocities (3, k) in rad/s.
+
+        Raises:
+            SettingError: there is no such frame.
+        """
+        from osimlite.derivatives.outputs import frame_columns, frame_places
+
+        places, chosen = frame_places(self.mechanism, self._packed), []
+        numbers = {path: self._fixed[1][12 * number : 12 * number + 12] for number, path in enumerate(places)}
+        for path in paths:
+            if path not in places:
+                raise SettingError(f"the model has no frame '{path}'{did_you_mean(path, places)}")
+            chosen.append((places[path][0], numbers[path]))
+        given = "t", "x", "p"
+        symbols = [self._symbols[name] for name in given]
+        results = frame_columns(self._moving, chosen)
+        return self._library.Function("frames", symbols, [*results.values()], [*given], [*results])
+
+    @cached_property
+    def _moving(self) -> Evaluated:
+        """The poses and speeds of the links, without forces."""
+        return self._traced.evaluated(STAGE.VELOCITY)
+
+    @cached_property
+    def paths(self) -> Any:
+        """``paths(t, x, p) -> lengths, speeds, moment_arms``: of the paths of `path_names`.
+
+        Lengths (m), lengthening speeds (m/s), and the moment arms (m, or 1 of sliding coordinates) about each of
+        `coordinates` (k, n): the generalized force of a tension of 1 N.
+        """
+        _, lengths, speeds = self._paths
+        size = len(self.coordinates)
+        arms = -self._library.jacobian(speeds, self._symbols["x"])[:, size : 2 * size]
+        return self._function("paths", ("t", "x", "p"), {"lengths": lengths, "speeds": speeds, "moment_arms": arms})
+
+    @cached_property
+    def path_names(self) -> tuple[str, ...]:
+        """Paths of the forces along the paths."""
+        return tuple(self._paths[0])
+
+    @cached_property
+    def _paths(self) -> tuple[list[str], Any, Any]:
+        from osimlite.derivatives.outputs import path_entries
+
+        return path_entries(self._packed, self.forces, self._evaluated)
+
+    # ------------------------------------------------------------------------------------------------- files
+    def save(self, folder: str | Path, functions: Iterable[str] = FUNCTIONS) -> list[Path]:
+        """Write the functions into a folder: each as ``NAME.casadi``, and all together as C.
+
+        ``casadi.Function.load`` reads the former without osimlite; ``model.c`` and ``model.h`` need only a compiler.
+        ``model.json`` has the names of the states, controls and parameters, and the numbers to start from.
+
+        Args:
+            folder: is made.
+            functions: those that are written.
+
+        Raises:
+            SettingError: there is no such function.
+            UnsupportedError: the model has paths around surfaces.
+        """
+        names, folder = [*functions], Path(folder)
+        if unknown := [name for name in names if name not in FUNCTIONS]:
+            raise SettingError(f"there is no function '{unknown[0]}'; there are {', '.join(FUNCTIONS)}")
+        if self._measured is not None:
+            raise UnsupportedError(
+                "paths around surfaces are searched for by osimlite, which files cannot do; put polynomials in their "
+                "places first (osimlite modify --replace paths=polynomial)"
+            )
+        make_folder(folder)
+        written = []
+        generator = self._library.CodeGenerator("model.c", {"with_header": True})
+        for name in names:
+            function = getattr(self, name)
+            written.append(folder / f"{name}.casadi")
+            function.save(str(written[-1]))
+            generator.add(function)
+        # The generator takes the folder for the beginning of a name.
+        generator.generate(f"{folder}/")
+        facts = {
+            "model": self.name,
+            "states": self.states,
+            "controls": self.controls,
+            "parameters": self.parameters,
+            "x": self.x.tolist(),
+            "p": self.p.tolist(),
+            "functions": {name: str(getattr(self, name)) for name in names},
+        }
+        write_into(folder, "model.json", json.dumps(facts, indent=1) + "\n")
+        return [*written, folder / "model.c", folder / "model.h", folder / "model.json"]
+
+
+def _fixed_numbers(mechanism: Mechanism, packed: Packed) -> tuple[Array, Array]:
+    """Points in their links of all stations (3 k,), and of all frames axes and origins there (12 m,)."""
+    from osimlite.derivatives.outputs import frame_places, station_places
+
+    stations = [number for _, _, point in station_places(mechanism, packed) for number in point]
+    frames = [number for _, numbers in frame_places(mechanism, packed).values() for number in numbers]
+    return np.array(stations), np.array(frames)

@@ -1,0 +1,141 @@
+"""A model near one of its states: xdot - f = A (x - x0) + B (u - u0), y - y0 = C (x - x0) + D (u - u0)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite.base.records import dataclass
+from osimlite.base.text import did_you_mean, did_you_mean_path
+from osimlite.derivatives.functions import CasadiModel
+from osimlite.derivatives.tangents import TangentModel, tangents
+from osimlite.errors import SettingError, SimulationError
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.model import Model
+
+Given = Mapping[str, float] | Sequence[float] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Linearization:
+    """The derivative of the state of a model near a state.
+
+    Attributes:
+        states: names of the entries of x, as in ``states.sto``; values, speeds, auxiliary states.
+        controls: names of the entries of u: paths of the actuators.
+        time: s.
+        x: the state (x,).
+        u: the controls (u,).
+        xdot: derivative of the state there (x,).
+        A: its derivative by the state (x, x), exact.
+        B: that by the controls (x, u), exact.
+        outputs: names of the entries of y, as ``GROUP:ENTRY``, those that were asked for.
+        y: the outputs there (y,).
+        C: their derivative by the state (y, x), exact.
+        D: that by the controls (y, u), exact.
+    """
+
+    states: tuple[str, ...]
+    controls: tuple[str, ...]
+    time: float
+    x: Array
+    u: Array
+    xdot: Array
+    A: Array
+    B: Array
+    outputs: tuple[str, ...]
+    y: Array
+    C: Array
+    D: Array
+
+
+def linearize(
+    model: Model | TangentModel | CasadiModel,
+    state: Given = None,
+    controls: Given = None,
+    *,
+    outputs: Sequence[str] = (),
+    time: float = 0.0,
+    folder: str | Path | None = None,
+) -> Linearization:
+    """The exact derivatives of the motion of a model by its state and by the controls of its actuators.
+
+    Controllers of the model are left aside: what they do is no part of A. Under constraints, accelerations are those
+    that fulfil them.
+
+    Args:
+        model: that moves; or what is made of it once for many states: its tangents (:func:`osimlite.tangents`), or
+            its functions (:func:`osimlite.casadi`), whose tangents these are then.
+        state: numbers by the names of states, the others as the model has them, or all (x,) in their order.
+        controls: numbers by the paths of actuators, the others 0, or all (u,).
+        outputs: what is observed, in the order of y: groups of `TangentModel.output_names` (``mass_center``), or single
+            entries of these (``mass_center:y``, ``forces:/forceset/soleus_r|tension``).
+        time: s.
+        folder: where the model's file is, for the files that it names; the folder that the program runs in if None.
+
+    Raises:
+        SettingError: there is no such state, control or output.
+        SimulationError: a coordinate moves no mass.
+
+    Other errors are those of :func:`osimlite.tangents`.
+    """
+    if isinstance(model, CasadiModel):
+        model = model.in_tangents
+    elif not isinstance(model, TangentModel):
+        model = tangents(model, (), folder)
+    x = _filled("state", model.states, model.x, state)
+    u = _filled("control", model.controls, model.u, controls)
+    xdot, a, b = model.linear(time, x, u)
+    if len(xdot) and np.isnan(xdot).all():
+        raise SimulationError("the model has no accelerations in this state; a simulation from it says why")
+    chosen = _chosen(model.output_names if outputs else {}, outputs)
+    if not (np.isfinite(xdot).all() and np.isfinite(a).all() and np.isfinite(b).all()):
+        raise SimulationError(_odd_entry(model.states, model.controls, xdot, a, b))
+    y, c, d = model.observed(time, x, u, chosen) if outputs else (np.zeros((0, size)) for size in (1, len(x), len(u)))
+    if not all(np.isfinite(part).all() for part in (y, c, d)):
+        raise SimulationError("an output of the model or its derivative is no finite number in this state")
+    names = tuple(f"{group}:{model.output_names[group][k]}" for group, k in chosen)
+    return Linearization(model.states, model.controls, time, x, u, xdot, a, b, names, y.ravel(), c, d)
+
+
+def _odd_entry(states: Sequence[str], controls: Sequence[str], xdot: Array, a: Array, b: Array) -> str:
+    """Return which derivative is NaN or infinite, in words."""
+    columns = [("", xdot.reshape(-1, 1), [""]), (" by ", a, states), (" by ", b, controls)]
+    for words, matrix, names in columns:
+        odd = np.argwhere(~np.isfinite(matrix))
+        if len(odd):
+            row, column = odd[0]
+            place = f"the rate of '{states[row]}'" + (f"{words}'{names[column]}'" if words else "")
+            return f"{place} is {matrix[row, column]:g}; look for a number in the model that is far too large or small"
+    return "a derivative is no finite number"
+
+
+def _chosen(output_names: Mapping[str, Sequence[str]], names: Sequence[str]) -> list[tuple[str, int]]:
+    """The groups of outputs and the places in these that names stand for."""
+    groups = {group: [(group, k) for k in range(len(labels))] for group, labels in output_names.items()}
+    single = {
+        f"{group}:{label}": [(group, k)] for group, labels in output_names.items() for k, label in enumerate(labels)
+    }
+    known, result = {**groups, **single}, list[tuple[str, int]]()
+    for name in names:
+        if name not in known:
+            raise SettingError(f"the model has no output '{name}'{did_you_mean(name, known)}")
+        result += known[name]
+    return result
+
+
+def _filled(what: str, names: Sequence[str], default: Array, given: Any) -> Array:
+    result = default.copy()
+    if isinstance(given, Mapping):
+        for name, value in given.items():
+            if name not in names:
+                raise SettingError(f"the model has no {what} '{name}'{did_you_mean_path(name, names)}")
+            result[names.index(name)] = value
+    elif given is not None:
+        if len(given) != len(names):
+            raise SettingError(f"the model has {len(names)} {what}s, not {len(given)}")
+        result[:] = given
+    return result

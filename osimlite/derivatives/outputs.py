@@ -1,0 +1,210 @@
+"""What is known of a state besides its derivative: where points are, forces, muscles, paths.
+
+As formulas, or as numbers that carry derivatives: `found` runs the kernels on whichever it has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from osimlite.mechanics.kernels.layout import INERTIA, INERTIA_AT, LINK, LINK_WORK, MODEL
+from osimlite.mechanics.kernels.parts import link_ints
+from osimlite.mechanics.kernels.paths import LENGTH, SPEED
+from osimlite.mechanics.kernels.points import angular_velocity, direction, station, velocity
+from osimlite.mechanics.multibody.links import Places
+from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.contact import PairContact
+from osimlite.simulation.elements.geometries.path import PATH
+from osimlite.simulation.elements.geometries.sphere_on_plane import SPHERE_ON_PLANE
+from osimlite.simulation.elements.kind import DeclaredForce
+from osimlite.simulation.elements.probe import DeclaredProbe
+from osimlite.simulation.engines.carrying import Carrying
+from osimlite.simulation.pack import Packed
+
+if TYPE_CHECKING:
+    from osimlite.derivatives.tangents import Seen
+    from osimlite.derivatives.traced import Evaluated
+
+    Found: TypeAlias = Evaluated | Seen
+
+AXES = "xyz"
+
+
+def station_places(mechanism: Mechanism, packed: Packed) -> list[tuple[str, int, tuple[float, ...]]]:
+    """Of every station its path, its link, and where in that it is."""
+    places = Places(mechanism, {}, packed.placements)
+    return [(path, *places.station(body, point.tolist())) for path, (body, point) in mechanism.stations.items()]
+
+
+def frame_places(mechanism: Mechanism, packed: Packed) -> dict[str, tuple[int, list[float]]]:
+    """By the path of every frame its link, and its axes and origin in that (12,)."""
+    places = Places(mechanism, {}, packed.placements)
+    return {path: places.frame(placed.body, placed.transform) for path, placed in mechanism.frames.items()}
+
+
+def probe_places(packed: Packed, elements: Sequence[Any]) -> list[int]:
+    """Places of the items of all probes."""
+    return [place for place, owner in packed.owners.items() if isinstance(elements[owner], DeclaredProbe)]
+
+
+def frame_columns(found: Evaluated, frames: Sequence[tuple[int, Sequence[Any]]]) -> dict[str, Any]:
+    """What `CasadiModel.frames` gives of a state.
+
+    Args:
+        found: of the state, up to its speeds.
+        frames: link, and axes and origin in the link (12,), which may be symbols.
+    """
+    from osimlite.derivatives.symbols import casadi
+
+    columns: list[list[Any]] = [[], [], [], []]
+    for link, numbers in frames:
+        origin = found.on(station)(found.model, found.data, link, tuple(numbers[9:]))
+        columns[0] += origin
+        for axis in range(3):
+            columns[1] += found.on(direction)(found.model, found.data, link, tuple(numbers[3 * axis : 3 * axis + 3]))
+        columns[2] += found.on(velocity)(found.model, found.data, link, origin)
+        columns[3] += found.on(angular_velocity)(found.model, found.data, link)
+    names = "position", "rotation", "velocity", "angular_velocity"
+    sizes = 3, 9, 3, 3
+    return {
+        name: casadi.reshape(found.sure(column), size, len(frames))
+        for name, column, size in zip(names, columns, sizes, strict=True)
+    }
+
+
+def output_columns(
+    mechanism: Mechanism, packed: Packed, forces: Forces, found: Found, points: Sequence[Any]
+) -> dict[str, tuple[list[str], Any]]:
+    """Columns and the names of their entries, as of `CasadiModel.outputs`.
+
+    Args:
+        mechanism: of the model.
+        packed: the same.
+        forces: of it.
+        found: of the state.
+        points: in their links, of all stations (3 k,), which may be symbols.
+    """
+    at_station, speed_of = found.on(station), found.on(velocity)
+    labels: list[str] = []
+    places: list[Any] = []
+    speeds: list[Any] = []
+    for number, (path, link, _) in enumerate(station_places(mechanism, packed)):
+        labels += [f"{path}|{axis}" for axis in AXES]
+        point = at_station(found.model, found.data, link, tuple(points[3 * number : 3 * number + 3]))
+        places += point
+        speeds += speed_of(found.model, found.data, link, point)
+    center, rate = _mass_center(mechanism, packed, found)
+    pushed = _contacts(packed, forces, found)
+    known = [
+        (f"{element.path}|{name}", found.data[items[-1][0] + place])
+        for element, items in zip(forces.elements, packed.items, strict=True)
+        if isinstance(element, DeclaredForce) and items
+        for name, place in element.kind.recorded.items()
+    ]
+    probed = [
+        (f"{probe.path}|{label}", probe.gain * found.data[items[-1][0] + place])
+        for probe, items in zip(forces.elements, packed.items, strict=True)
+        if isinstance(probe, DeclaredProbe)
+        for place, label in enumerate(probe.reading.labels)
+    ]
+    return {
+        "stations": (labels, found.sure(places)),
+        "station_velocities": (labels, found.sure(speeds)),
+        "mass_center": ([*AXES], found.sure(center)),
+        "mass_center_velocity": ([*AXES], found.sure(rate)),
+        "contact_forces": ([name for name, _ in pushed], found.sure([value for _, value in pushed])),
+        "forces": ([name for name, _ in known], found.sure([value for _, value in known])),
+        "probes": ([name for name, _ in probed], found.sure([value for _, value in probed])),
+    }
+
+
+def _mass_center(mechanism: Mechanism, packed: Packed, found: Found) -> tuple[list[Any], list[Any]]:
+    """Where the mass centre of all bodies is, and how it moves."""
+    parts = []
+    for link in range(int(packed.structure[MODEL.LINKS])):
+        first = INERTIA_AT + INERTIA.SIZE * link
+        parts.append((found.reals[first], link, tuple(found.reals[first + INERTIA.CENTER : first + INERTIA.MOMENTS])))
+    for placement, body in zip(packed.placements, mechanism.bodies, strict=True):
+        if placement.link == GROUND:
+            own, frame = body.mass_properties, placement.frame
+            parts.append((own.mass, GROUND, tuple((frame[:3, :3] @ own.center + frame[:3, 3]).tolist())))
+    total, center, rate = 0.0, [0.0] * 3, [0.0] * 3
+    for mass, link, point in parts:
+        place = found.on(station)(found.model, found.data, link, point)
+        moves = found.on(velocity)(found.model, found.data, link, place)
+        total = total + mass
+        center = [a + mass * b for a, b in zip(center, place, strict=True)]
+        rate = [a + mass * b for a, b in zip(rate, moves, strict=True)]
+    # A symbol is neither.
+    if isinstance(total, (float, Carrying)) and float(total) == 0.0:
+        total = nan
+    return [a / total for a in center], [a / total for a in rate]
+
+
+def _contacts(packed: Packed, forces: Forces, found: Found) -> list[tuple[str, Any]]:
+    """Force and point of each contact, which stand at the beginning of what the kernels know of it."""
+    pairs: list[tuple[str, int]] = []
+    for element, items in zip(forces.elements, packed.items, strict=True):
+        if isinstance(element, PairContact):
+            folder = element.path.rpartition("/")[0]
+            pairs += [
+                (f"{folder}/{element.pair_name(k)}", place) for k, (place, _) in enumerate(items[: len(element.pairs)])
+            ]
+        elif isinstance(element, DeclaredForce) and element.kind.geometry is SPHERE_ON_PLANE and items:
+            pairs.append((element.path, items[-1][0] + len(element.kind.recorded)))
+    return [
+        (f"{name}|{what}_{axis}", found.data[place + 3 * part + k])
+        for name, place in pairs
+        for part, what in enumerate(("force", "point"))
+        for k, axis in enumerate(AXES)
+    ]
+
+
+def path_entries(packed: Packed, forces: Forces, found: Evaluated) -> tuple[list[str], Any, Any]:
+    """Names, lengths and lengthening speeds of all paths along which something pulls."""
+    names, lengths, speeds = list[str](), list[Any](), list[Any]()
+    for element, items in zip(forces.elements, packed.items, strict=True):
+        if isinstance(element, DeclaredForce) and element.kind.geometry is PATH and len(items) > 1:
+            record = items[-2][0]
+            names.append(element.path)
+            lengths.append(found.data[record + LENGTH])
+            speeds.append(found.data[record + SPEED])
+    return names, found.sure(lengths), found.sure(speeds)
+
+
+def joint_load_columns(
+    found: Evaluated,
+    link: int,
+    origin: tuple[int, Sequence[Any]],
+    sign: float,
+    pushes: Sequence[tuple[int, Any, Sequence[Any]]],
+) -> dict[str, Any]:
+    """What `CasadiModel.joint_load` gives of a state.
+
+    Args:
+        found: what is missing for accelerations.
+        link: that the joint carries.
+        origin: link of the frame at whose origin the load acts, and where that is in the link (3,).
+        sign: 1 if the load acts on what the joint carries, -1 if on what carries the joint.
+        pushes: links that a constraint pushes, its multiplier, and the wrench of a unit of that.
+    """
+    from osimlite.derivatives.symbols import casadi
+
+    beyond = {link}
+    for later in range(link + 1, found.model[MODEL.LINKS]):
+        if found.on(link_ints)(found.model, later)[LINK.PARENT] in beyond:
+            beyond.add(later)
+    first = found.model[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
+    wrench = casadi.vertcat(*found.data[first + LINK_WORK.WRENCH : first + LINK_WORK.WRENCH + 6])
+    for of, multiplier, unit in pushes:
+        if of in beyond:
+            wrench -= multiplier * casadi.vertcat(*unit)
+    wrench *= -sign
+    place = found.on(station)(found.model, found.data, origin[0], tuple(origin[1]))
+    start = found.data[first + LINK_WORK.ORIGIN : first + LINK_WORK.ORIGIN + 3]
+    arm = casadi.vertcat(*place) - casadi.vertcat(*start)
+    moment = wrench[:3] - casadi.cross(arm, wrench[3:])
+    return {"force": found.sure([wrench[3:]]), "moment": found.sure([moment])}

@@ -1,0 +1,307 @@
+"""How a simulated motion depends on numbers of the model and on where it starts: dS/dt = (df/dx) S + df/dp.
+
+The equation is integrated by Merson's formula over the very steps that `simulate` took, from the states that it found:
+what comes out is the exact derivative of these steps, their lengths held (H. G. Bock, "Numerical treatment of inverse
+problems in chemical reaction kinetics", Springer 1981). Where the laws have a bend (Thelen's muscles have several), a
+derivative is off by the length of a step although the motion is not: such steps are halved until it is accurate too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite.base.records import dataclass
+from osimlite.base.text import did_you_mean_path
+from osimlite.derivatives.parameters import number_of
+from osimlite.derivatives.stated import StatedModel
+from osimlite.derivatives.tangents import Steps, TangentModel, tangents
+from osimlite.errors import SettingError, SimulationError
+from osimlite.io.tables.tabular import Tabular
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.model import Model, expect_model
+from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.options import PER_RUN
+from osimlite.simulation.properties import places
+from osimlite.simulation.run import Simulation
+from osimlite.simulation.start import starting
+from osimlite.simulation.trajectory import Trajectory
+
+CHOICES = {*PER_RUN, "folder"} - {"fixed_step", "integrator", "controller", "resume"}
+"""Options of `simulate` that leave the motion one of the rates as they are, in steps of Merson's method."""
+ACCURACY = 1e-6
+"""That is taken where none is chosen."""
+LOOSER = 10.0
+"""So many times the accuracy is what the error of a derivative may be in a step, over the largest by that number: less
+makes them no better, for the motion is not."""
+SAME = 1e-6
+"""What rates of the tangents may be off from those of the motion, over the largest of a state or 1."""
+YIELDING, SAME_EQUATION = 1e5, 1e-9
+"""How much more readily coordinates move that do not count; what an equation says beyond others if it counts."""
+SHORTEST = 1e-9
+"""Part of a step, s, to which a bend of the equations is narrowed down."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity(Tabular):
+    """The derivatives of a motion by numbers of its model and by its start.
+
+    Attributes:
+        trajectory: the motion, as `simulate` gives it.
+        times: of its rows (n,), s.
+        states: names of the x states as in ``states.sto``: values, speeds, auxiliary states; locked coordinates are
+            none.
+        numbers: what the derivatives are by (k,): paths of parameters, then names of states, which stand for their
+            values at the start.
+        motion: the states (n, x) at the times; m, rad, s.
+        derivatives: of each state by each number (n, x, k), in units of the state over those of the number.
+    """
+
+    trajectory: Trajectory
+    times: Array
+    states: tuple[str, ...]
+    numbers: tuple[str, ...]
+    motion: Array
+    derivatives: Array
+
+    def of(self, state: str, number: str) -> Array:
+        """The derivative (n,) of a state by a number.
+
+        Raises:
+            SettingError: there is no such state, or no such number.
+        """
+        at = [_place(*names) for names in (("state", self.states, state), ("number", self.numbers, number))]
+        result: Array = self.derivatives[:, at[0], at[1]]
+        return result
+
+    @property
+    def table(self) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+        """Columns ``STATE|NUMBER`` (n,) over ``time`` (s)."""
+        columns = {f"{state}|{number}": self.of(state, number) for state in self.states for number in self.numbers}
+        return {"time": self.times}, columns
+
+
+def sensitivity(
+    model: Model,
+    parameters: Iterable[str] | StatedModel = (),
+    to: float = 2.0,
+    *,
+    states: Iterable[str] = (),
+    **choices: Any,
+) -> Sensitivity:
+    """The derivatives of all states along a simulated motion by numbers of the model and by states at its start.
+
+    The motion is that of :func:`osimlite.simulate` by Merson's steps. Its start is held: what of it follows from
+    parameters, as where muscles are in equilibrium (`equilibrate`), counts as given. Where constraints bind the motion
+    the start goes with them, as little as they need.
+
+    Args:
+        model: what moves.
+        parameters: numbers of the model, by paths as :func:`osimlite.tangents` takes them; or its tangents, so
+            that they are made once for many motions; or its functions (:func:`osimlite.casadi`), for their parameters.
+            Their values are those in the model now.
+        to: how long, s.
+        states: names of states (``/jointset/knee/flexion/value``) that the derivatives are by, too, at the start.
+        choices: `accuracy`, `report_interval`, `initial`, `initial_speeds`, `equilibrate`, `controls`, `progress` and
+            `folder` of :class:`osimlite.simulation.Options`. The accuracy is 1e-6 if left out, with which the
+            derivatives of a second of muscles with tendons are good to 1e-3 of the largest, of smooth motions to 1e-5;
+            take less for more.
+
+    Raises:
+        SettingError: there is no such number or state, or an option that does not go with this; the tangents are
+            those of another model.
+        UnsupportedError: a force is computed in Python.
+        SimulationError: the motion ended, or a derivative of it is no finite number.
+
+    Other errors are those of :func:`osimlite.tangents` and :func:`osimlite.simulate`.
+    """
+    expect_model(model)
+    for name in choices:
+        if name not in CHOICES:
+            raise SettingError(
+                f"'{name}' does not go with sensitivities, which follow Merson's steps of the model as it is; "
+                f"leave it out ({', '.join(sorted(CHOICES))} can be chosen)"
+            )
+    accuracy = choices["accuracy"] = choices.get("accuracy") or ACCURACY
+    folder = Path(choices.get("folder") or ".")
+    with Simulation(model, "compiled", folder=folder) as simulation:
+        if isinstance(parameters, TangentModel):
+            made = parameters
+        else:
+            made = tangents(model, parameters.parameters if isinstance(parameters, StatedModel) else parameters, folder)
+        initial = [_place("state", made.states, name) for name in states]
+        for name in made.parameters:
+            _require_held(model, made, name)
+        made.take(np.array([number_of(model, name) for name in made.parameters]))
+        trajectory = simulation.run(to, **{name: choices[name] for name in choices if name != "folder"})
+        _, _, held = starting(simulation.mechanism, _moving(simulation, choices), choices.get("initial_speeds") or {})
+        motion = _Followed(made, simulation, initial, held)
+        rows = motion.rows(trajectory, accuracy)
+    names = *made.parameters, *(made.states[k] for k in initial)
+    return Sensitivity(trajectory, trajectory.times, made.states, names, motion.states(trajectory), rows)
+
+
+class _Followed:
+    """The derivatives along the steps of a motion.
+
+    Args:
+        made: tangents of the model, with the parameters that it has.
+        simulation: of it, with the controls of the motion.
+        initial: places of the states of which the start counts.
+        held: places in the mechanism of the coordinates whose values, and of those whose speeds, were given.
+    """
+
+    def __init__(
+        self, made: TangentModel, simulation: Simulation, initial: Sequence[int], held: Sequence[Sequence[int]]
+    ) -> None:
+        self._made, self._simulation, self._initial, self._held = made, simulation, initial, held
+        engine: Any = simulation.engine
+        self._engine = engine
+        infos, order = simulation.mechanism.coordinates, self._engine.order
+        moving = [f"{infos[place].path}/{what}" for what in ("value", "speed") for place in order]
+        known = [*moving, *(variable.path for variable in simulation.state.variables if variable.is_named)]
+        if {*known} != {*made.states} or made.controls != simulation.forces.controls.names:
+            raise SettingError("the tangents are of another model; make them of this one")
+        own = [*moving, *simulation.state.paths]
+        self._places = [own.index(name) for name in made.states]
+        count = len(made.parameters)
+        self._steps = made.steps(engine.driving, np.eye(count, count + len(initial)))
+
+    def states(self, trajectory: Trajectory) -> Array:
+        """The motion (n, x), in the order of the tangents."""
+        return self._rows(trajectory)[:, self._places]
+
+    def _rows(self, trajectory: Trajectory) -> Array:
+        auxiliary = trajectory.auxiliary
+        return self._simulation.state.rows(trajectory.values, trajectory.speeds, auxiliary)
+
+    def rows(self, trajectory: Trajectory, accuracy: float) -> Array:
+        """The derivatives (n, x, k) at the times of the motion."""
+        start = self._rows(trajectory)[0].tolist()
+        wanted = trajectory.times.tolist()
+        times, states, ended = self._simulation.every_step(0.0, start, wanted[-1], Settings(accuracy))
+        if ended is not None:
+            raise ended
+        for place in (0, len(times) // 2, -1):
+            self._require_same(times[place], states[place])
+        count, initial = len(self._made.parameters), self._initial
+        slopes = np.zeros((len(self._places), count + len(initial)))
+        slopes[initial, range(count, count + len(initial))] = 1.0
+        rows = np.array(states)[:, self._places]
+        if self._simulation.constraints:
+            self._bind(rows[0], slopes)
+        return followed(self._steps, times, rows, slopes, wanted, accuracy, self._made.states)
+
+    def _bind(self, x: Array, slopes: Array) -> None:
+        """Have the start (x,) go with the constraints along all directions, by derivatives (x, m) of it.
+
+        As it was found: of what is not held, values that do not count give way, then all as little as can be, and
+        speeds relative to themselves where they are above 1.
+        """
+        made, size = self._made, len(self._made.coordinates)
+        infos = {info.path: info for info in made.mechanism.coordinates}
+        eases = np.ones(size), np.maximum(np.abs(x[size : 2 * size]), 1.0)
+        eases[0][[infos[path].yielding for path in made.coordinates]] = YIELDING
+        by_numbers = np.eye(len(made.parameters), slopes.shape[1])
+        for part, (held, ease, equations) in enumerate(zip(self._held, eases, made.bound(0.0, x), strict=True)):
+            places = slice(part * size, (part + 1) * size)
+            paths = [made.mechanism.coordinates[place].path for place in held]
+            scales = np.where(np.isin(made.coordinates, paths), 0.0, ease)
+            missing = equations @ np.vstack((slopes, by_numbers))
+            change = np.linalg.lstsq(equations[:, places] * scales, missing, rcond=SAME_EQUATION)[0]
+            slopes[places] -= scales[:, None] * change
+
+    def _require_same(self, t: float, y: Sequence[float]) -> None:
+        """SettingError where the tangents say another derivative of the state than the motion has."""
+        wanted = np.array(self._engine.derivative(t, y))[self._places]
+        state = np.asarray(y)[self._places]
+        found, _ = self._made.along(t, state, self._engine.controls(), np.zeros((len(state), 0)))
+        off = np.abs(found - wanted)
+        if not np.all(off <= SAME * max(1.0, np.abs(wanted).max(initial=0.0))):
+            worst = self._made.states[int(np.argmax(np.where(np.isfinite(off), off, np.inf)))]
+            raise SettingError(
+                f"at {t:g} s the tangents say another derivative of '{worst}' than the motion has; make them of this "
+                "very model"
+            )
+
+
+def followed(
+    steps: Steps,
+    times: Sequence[float],
+    states: Array,
+    slopes: Array,
+    wanted: Sequence[float],
+    accuracy: float,
+    names: Sequence[str],
+) -> Array:
+    """The derivatives (n, x, m) of a motion along m directions at some of its times.
+
+    Args:
+        steps: of the model, with the numbers and the directions that are meant.
+        times: of the ends of all steps, s.
+        states: there (s, x).
+        slopes: of the start along the directions (x, m).
+        wanted: the times (n,), from the start on, s.
+        accuracy: of the motion.
+        names: of the states, for messages.
+
+    Raises:
+        SimulationError: a derivative is no finite number.
+    """
+
+    def stepped(t0: float, t1: float, y0: Array) -> Array:
+        """The blocks at the end of a step, in as many parts as the accuracy of the derivatives needs."""
+        h = t1 - t0
+        y, error = steps.step(t0, t1, y0)
+        size = np.abs(y)
+        if not np.isfinite(size.sum()):
+            worst = names[int(np.nonzero(~np.isfinite(steps.slopes(y)).all(axis=1))[0][0])]
+            raise SimulationError(f"between {t0:g} and {t1:g} s the derivatives of '{worst}' are no finite numbers")
+        # As the integrator weighs states; of each number, what counts is its largest derivative.
+        before = np.abs(y0)
+        weights = 1.0 / np.maximum(1.0, before[:, :, :1])
+        sizes = (np.maximum(before, size) * weights).max(axis=1)
+        errors = (np.abs(error) * weights).max(axis=1)
+        if h > SHORTEST and (errors > LOOSER * accuracy * sizes)[:, 1:].any():
+            middle = t0 + h / 2.0
+            return stepped(middle, t1, stepped(t0, middle, y0))
+        return y
+
+    result, row = np.empty((len(wanted), *slopes.shape)), 1
+    result[0] = slopes
+    y = steps.blocks(states[0], slopes)
+    # The steps are those of the motion, each from where that was.
+    values = [steps.blocks(state, slopes)[0, :, 0] for state in states]
+    for (t, state), (end, _) in pairwise(zip(times, values, strict=True)):
+        y[:, :, 0] = state
+        while row < len(wanted) and wanted[row] <= end:
+            y, t = stepped(t, wanted[row], y), wanted[row]
+            result[row], row = steps.slopes(y), row + 1
+        if t < end:
+            y = stepped(t, end, y)
+    return result
+
+
+def _require_held(model: Model, made: TangentModel, name: str) -> None:
+    """SettingError for a number that says where a state starts."""
+    for place in places(model, name):
+        what = str(place.steps[0])
+        state = f"{place.component}/{what.removeprefix('default_').removesuffix('_value')}"
+        if what.startswith("default_") and state in made.states:
+            raise SettingError(f"'{name}' is where a state starts, which is held; take '{state}' among the states")
+
+
+def _moving(simulation: Simulation, choices: Mapping[str, Any]) -> dict[str, float]:
+    """What was given of the values of coordinates at the start, and not of auxiliary states."""
+    auxiliary = simulation.state.paths
+    return {name: value for name, value in (choices.get("initial") or {}).items() if name not in auxiliary}
+
+
+def _place(what: str, names: Sequence[str], name: str) -> int:
+    if name not in names:
+        raise SettingError(f"there is no {what} '{name}'{did_you_mean_path(name, names)}")
+    return names.index(name)

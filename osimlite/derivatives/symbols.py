@@ -1,0 +1,355 @@
+"""Numbers that may be symbols of CasADi, and what the code of kernels does with them. Only this module imports CasADi.
+
+A branch that depends on a symbol becomes a selection: both sides are computed. While one side is, a condition says
+where it counts, and what could be no number elsewhere (a quotient, a root) is computed there from 1 instead, so that
+nothing of it reaches the derivatives of the other side.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from osimlite.base.require import require
+from osimlite.errors import MissingDependency
+
+if "opensim" in sys.modules and "casadi" not in sys.modules:
+    # OpenSim has a library of the same name with other contents.
+    raise MissingDependency("casadi cannot be loaded where opensim is loaded already; take another process")
+casadi: Any = require("casadi", extra="casadi", purpose="a model as functions of CasADi")
+SX: Any = casadi.SX
+
+Number = Any
+"""A float, an integer, or an `SX`."""
+
+
+class Unset:
+    """What a variable is before anything is assigned to it."""
+
+
+UNSET = Unset()
+
+
+class NoFormula(Exception):
+    """There is something in a kernel, or in how it is used, that has no meaning for symbols.
+
+    Attributes:
+        items: of the calls that led there, the innermost first.
+    """
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.items: list[int] = []
+
+
+class WiderWays(Exception):
+    """What one part of the code has merged is needed apart by a later one: a wider part has to be run in both ways.
+
+    Attributes:
+        part: that has merged it.
+    """
+
+    def __init__(self, part: Any) -> None:
+        super().__init__(str(part))
+        self.part = part
+
+
+class Torn:
+    """An integer, or something like one, that differs between the two sides of a branch: nobody may ask for it."""
+
+    def __init__(self, part: Any) -> None:
+        self.part = part
+
+    def _asked(self, *_: Any) -> Any:
+        raise WiderWays(self.part)
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = __neg__ = _asked
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __index__ = __int__ = __float__ = __bool__ = _asked
+    __getitem__ = __setitem__ = __floordiv__ = __mod__ = __pow__ = __and__ = __iter__ = __len__ = _asked
+    __hash__ = None  # type: ignore[assignment]
+
+
+class Vector:
+    """The cells of a list from a place on; what is written is remembered while a branch is being computed."""
+
+    __slots__ = ("cells", "first")
+    journals: list[dict[tuple[int, int], tuple[list[Any], int, Any]]] = []  # noqa: RUF012 - one for all
+    """For each branch that is open the cells that were written, with what was there."""
+
+    def __init__(self, cells: list[Any], first: int = 0) -> None:
+        self.cells, self.first = cells, first
+
+    def __getitem__(self, place: Any) -> Number:
+        if type(place) is slice:
+            return self.cells[self.first + place.start : self.first + place.stop]
+        place = self.first + place
+        if place < 0:
+            raise IndexError("a kernel reads before the beginning of a vector")
+        return self.cells[place]
+
+    def __setitem__(self, place: int, value: Number) -> None:
+        place = self.first + place
+        if place < 0:
+            raise IndexError("a kernel writes before the beginning of a vector")
+        if self.journals:
+            self.journals[-1].setdefault((id(self.cells), place), (self.cells, place, self.cells[place]))
+        self.cells[place] = value
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Vector) and self.cells is other.cells and self.first == other.first
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def rest(self, place: int) -> Vector:
+        """The vector from a place on."""
+        return Vector(self.cells, self.first + place)
+
+
+class _Where:
+    """Where what is being computed counts: None everywhere, else a condition."""
+
+    condition: Any = None
+
+
+where = _Where()
+
+
+def is_symbol(value: Any) -> bool:
+    """Whether a number depends on a symbol."""
+    return isinstance(value, SX) and not value.is_constant()
+
+
+def plain(value: Any) -> Any:
+    """A number that depends on no symbol as a float; others as they are."""
+    return float(value) if isinstance(value, SX) and value.is_constant() else value
+
+
+@contextmanager
+def counting(test: Any) -> Iterator[None]:
+    """While something is computed that counts only where a test holds too."""
+    before = where.condition
+    where.condition = also(test)
+    try:
+        yield
+    finally:
+        where.condition = before
+
+
+def also(test: Any) -> Any:
+    """Where what is being computed counts, and a test holds."""
+    return test if where.condition is None else casadi.logic_and(where.condition, test)
+
+
+def safe(value: Any, instead: float = 1.0) -> Any:
+    """A symbol, and a number for which all is defined where it does not count."""
+    return value if where.condition is None else casadi.if_else(where.condition, value, instead)
+
+
+def merged(test: Any, a: Any, b: Any, part: Any) -> Any:
+    """`a` where a test holds, else `b`.
+
+    Args:
+        test: a symbol.
+        a: numbers, tuples of them, or what is the same in both.
+        b: likewise.
+        part: of the code, which is run once more for each way if what cannot be merged is asked for.
+    """
+    if a is b or isinstance(b, Unset):
+        return a
+    if isinstance(a, Unset):
+        return b
+    if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
+        parts = [merged(test, x, y, part) for x, y in zip(a, b, strict=True)]
+        return type(a)(*parts) if hasattr(a, "_fields") else tuple(parts)
+    a, b = plain(a), plain(b)
+    if isinstance(a, bool) and isinstance(b, bool):
+        return a if a == b else (test if a else casadi.logic_not(test))
+    if isinstance(a, Torn) or isinstance(b, Torn):
+        return Torn(part)
+    if isinstance(a, SX) or isinstance(b, SX):
+        if isinstance(a, SX) and isinstance(b, SX) and casadi.is_equal(a, b, 1):
+            return a
+        return casadi.if_else(test, a, b)
+    if type(a) is type(b) and a == b:
+        return a
+    if isinstance(a, float) or isinstance(b, float):
+        return casadi.if_else(test, a, b)
+    return Torn(part)
+
+
+# ------------------------------------------------------------------------------------------ instead of Python's own
+def _joining(operation: Callable[[Any, Any], Any], number: int) -> Callable[[Any, Any], Any]:
+    """An operation on two numbers; CasADi takes eight times as long to find by its operators what it is given."""
+    binary = SX.binary
+
+    def joined(a: Any, b: Any) -> Any:
+        return binary(number, a, b) if isinstance(a, SX) or isinstance(b, SX) else operation(a, b)
+
+    return joined
+
+
+plus = _joining(operator.add, casadi.OP_ADD)
+minus = _joining(operator.sub, casadi.OP_SUB)
+times = _joining(operator.mul, casadi.OP_MUL)
+
+
+def divide(a: Any, b: Any) -> Any:
+    """a / b; also by zero, as machine code has it."""
+    if is_symbol(b):
+        return a / safe(b)
+    a, b = plain(a), plain(b)
+    if b == 0.0 and not isinstance(a, SX):
+        return math.nan if a == 0.0 or math.isnan(a) else math.copysign(math.inf, a) * math.copysign(1.0, b)
+    return a / b
+
+
+def power(a: Any, b: Any) -> Any:
+    """a to the power of b."""
+    a, b = plain(a), plain(b)
+    if not (isinstance(a, SX) or isinstance(b, SX)):
+        return a**b
+    if not isinstance(b, SX) and b == int(b) and b >= 0:
+        return a ** int(b)
+    return (safe(a) if isinstance(a, SX) else a) ** b
+
+
+def both(*parts: Callable[[], Any]) -> Any:
+    """`and`."""
+    return _joined(parts, stop=False)
+
+
+def either(*parts: Callable[[], Any]) -> Any:
+    """`or`."""
+    return _joined(parts, stop=True)
+
+
+def _joined(parts: Iterable[Callable[[], Any]], *, stop: bool) -> Any:
+    known: Any = None
+    before = where.condition
+    try:
+        for part in parts:
+            value = plain(part())
+            if not is_symbol(value):
+                if bool(value) is stop:
+                    return stop
+                continue
+            known = value if known is None else (casadi.logic_or if stop else casadi.logic_and)(known, value)
+            where.condition = also(casadi.logic_not(value) if stop else value)
+    finally:
+        where.condition = before
+    return (not stop) if known is None else known
+
+
+def negated(value: Any) -> Any:
+    """`not`."""
+    return casadi.logic_not(value) if is_symbol(value) else not plain(value)
+
+
+def choose(test: Any, a: Callable[[], Any], b: Callable[[], Any], part: Any) -> Any:
+    """`a() if test else b()`."""
+    if not is_symbol(test):
+        return a() if plain(test) else b()
+    with counting(test):
+        one = a()
+    with counting(casadi.logic_not(test)):
+        other = b()
+    return merged(test, one, other, part)
+
+
+def is_nothing(value: Any) -> bool:
+    """Whether a number is 0 whatever the symbols are."""
+    return not is_symbol(value) and plain(value) == 0.0
+
+
+def smallest(*values: Any) -> Any:
+    """`min`."""
+    return _reduced(casadi.fmin, min, values)
+
+
+def largest(*values: Any) -> Any:
+    """`max`."""
+    return _reduced(casadi.fmax, max, values)
+
+
+def _reduced(symbolic: Any, numeric: Any, values: tuple[Any, ...]) -> Any:
+    result, *rest = map(plain, values)
+    for value in rest:
+        take = symbolic if isinstance(result, SX) or isinstance(value, SX) else numeric
+        result = take(result, value)
+    return result
+
+
+def magnitude(value: Any) -> Any:
+    """`abs`."""
+    return casadi.fabs(value) if is_symbol(value) else abs(plain(value))
+
+
+def whole(value: Any) -> int:
+    """`int`; a kernel that asks for the integer of a symbol has no formula."""
+    if is_symbol(value):
+        raise NoFormula("a place in a table depends on the state")
+    return int(plain(value))
+
+
+def root(value: Any) -> Any:
+    """`sqrt`; its derivative at 0, and at a square that was kept from below zero, is 0."""
+    if not is_symbol(value):
+        return math.sqrt(plain(value))
+    test = value > 0.0 if value.op() == casadi.OP_FMAX else value != 0.0
+    with counting(test):
+        return casadi.if_else(test, casadi.sqrt(safe(value)), 0.0)
+
+
+def length_of(*values: Any) -> Any:
+    """`hypot`."""
+    if not any(map(is_symbol, values)):
+        return math.hypot(*map(plain, values))
+    return root(sum(value * value for value in values))
+
+
+def _of(name: str, instead: float | None = None) -> Callable[..., Any]:
+    """A function of `math` for symbols too.
+
+    Args:
+        name: of it.
+        instead: argument where it does not count; without, the function is defined everywhere.
+    """
+    numeric, symbolic = getattr(math, name), getattr(casadi, name)
+
+    def function(*values: Any) -> Any:
+        if not any(map(is_symbol, values)):
+            return numeric(*map(plain, values))
+        return symbolic(*(safe(v, instead) if instead is not None and is_symbol(v) else v for v in values))
+
+    return function
+
+
+def sine_cosine(angle: Any) -> tuple[Any, Any]:
+    """As in `kernels/trigonometry.py`, whose polynomials are those of a processor's sine."""
+    return COUNTERPARTS[math.sin](angle), COUNTERPARTS[math.cos](angle)
+
+
+COUNTERPARTS: dict[Any, Any] = {
+    min: smallest,
+    max: largest,
+    abs: magnitude,
+    int: whole,
+    float: lambda value: value if is_symbol(value) else float(plain(value)),
+    bool: lambda value: value if is_symbol(value) else bool(plain(value)),
+    math.sqrt: root,
+    math.hypot: length_of,
+    math.isnan: lambda value: False if is_symbol(value) else math.isnan(plain(value)),
+    math.isfinite: lambda value: True if is_symbol(value) else math.isfinite(plain(value)),
+}
+"""What stands in the place of Python's own functions."""
+for _name in ("sin", "cos", "tan", "atan", "tanh", "floor", "ceil", "erf", "copysign"):
+    COUNTERPARTS[getattr(math, _name)] = _of(_name)
+for _name in ("exp", "expm1", "sinh", "cosh", "asin", "acos"):
+    COUNTERPARTS[getattr(math, _name)] = _of(_name, 0.0)
+for _name in ("log", "log1p", "atan2"):
+    COUNTERPARTS[getattr(math, _name)] = _of(_name, 1.0)
+COUNTERPARTS[math.erfc] = lambda value: 1.0 - COUNTERPARTS[math.erf](value) if is_symbol(value) else math.erfc(value)

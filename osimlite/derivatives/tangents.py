@@ -1,0 +1,358 @@
+"""The rates of a model with their exact derivatives along directions, in machine code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache, cached_property, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite.base.records import replace
+from osimlite.derivatives.outputs import output_columns, probe_places, station_places
+from osimlite.derivatives.stated import StatedModel
+from osimlite.errors import UnsupportedError
+from osimlite.mechanics.kernels import merson
+from osimlite.mechanics.kernels.layout import (
+    CONSTRAINED,
+    CONSTRAINT,
+    ITEM,
+    MODEL,
+    OUTCOME,
+    STAGE,
+    WORK,
+)
+from osimlite.mechanics.kernels.method import ACCEPTED, ERRORS, LAST_TIME, NEXT_STEP, REACHED
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.model import Model, expect_model
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.controls import Controls
+from osimlite.simulation.elements.laws import DIRECTIONS
+from osimlite.simulation.engines.carrying import Carrying, DualVector, carried_by
+from osimlite.simulation.engines.linking import Program, Tangents
+from osimlite.simulation.integrators import MERSON
+from osimlite.simulation.pack import Packed, pack
+
+
+def tangents(model: Model, parameters: Iterable[str] = (), folder: str | Path | None = None) -> TangentModel:
+    """The rates of a model with exact derivatives, by the machine code that simulates it.
+
+    Args:
+        model: what moves.
+        parameters: numbers of the model, by path, that the rates are functions of, as of :func:`osimlite.casadi`.
+        folder: where the model's file is, for the files that it names; the folder that the program runs in if None.
+
+    Raises:
+        ModelError: the model is not a mechanism.
+        SettingError: there is no such number.
+        UnsupportedError: a force is computed in Python, or a number cannot be a parameter; the message names it.
+    """
+    expect_model(model)
+    return TangentModel(model, tuple(parameters), Path(folder or "."))
+
+
+class Machine:
+    """Machine code of a packed model, and the vectors that it works on: rows of numbers and their derivatives.
+
+    Args:
+        packed: the model.
+        forces: of it.
+        entries: names of the kernels that are called.
+        room: for so many numbers more in the work vector.
+
+    Attributes:
+        program: the model with the addresses of its code.
+        x: the numbers.
+        w: the work vector.
+
+    Raises:
+        UnsupportedError: a force is computed in Python.
+    """
+
+    def __init__(self, packed: Packed, forces: Forces, entries: Sequence[str], room: int = 0) -> None:
+        for place, kernel in packed.kernels.items():
+            if place in packed.owners and not isinstance(kernel, str):
+                path = forces.elements[packed.owners[place]].path
+                raise UnsupportedError(
+                    f"'{path}' is computed in Python, which finds no derivatives; set its appliesForce to false"
+                )
+        # Nothing is projected.
+        laws = tuple(name for name in packed.laws if name != "project")
+        self.program = Program(replace(packed, laws=laws), _code(), entries)
+        self.x = np.zeros((len(packed.numbers), 1 + DIRECTIONS))
+        self.x[:, 0] = packed.numbers
+        self.w = np.zeros((int(packed.structure[MODEL.WORK_SIZE]) + room, 1 + DIRECTIONS))
+
+    def entry(self, name: str, y: Array, f: Array) -> Callable[[int], int]:
+        """A kernel that is called with the last of its arguments."""
+        return self.program.code.bound(name, self.program.ints, self.x, self.w, y, f)
+
+    def begin(self, t: float) -> None:
+        """Set the time, and forget what other directions have left."""
+        self.w[:, 1:] = 0.0
+        self.w[WORK.TIME, 0] = t
+
+
+class TangentModel(StatedModel):
+    """A model whose rates xdot = f(t, x, u, p) are found with derivatives along directions of x, u and p.
+
+    The controls u stand in the place of what the model's controllers say (to which a stretch reflex adds). Units are
+    those of OpenSim's files of states: m, rad, s, N. Where rates do not exist, all is not a number. Where a law bends,
+    or a path touches a surface, the derivative is that of the side that machine code takes there.
+
+    The arguments and attributes are those of :class:`osimlite.derivatives.stated.StatedModel`.
+    """
+
+    def __init__(self, model: Model, parameters: Sequence[str] = (), folder: Path = Path()) -> None:
+        super().__init__(model, parameters, folder)
+        packed = self._packed
+        slopes = self._parameters.slopes if self._parameters else {}
+        self._parametric, self._slopes = [*slopes], np.zeros((len(slopes), len(self.parameters)))
+        for row, parts in zip(self._slopes, slopes.values(), strict=True):
+            for number, factor in parts:
+                row[number] = factor
+        self._machine = machine = Machine(packed, self.forces, ("evaluate",))
+        # The controls are given, whatever the controllers of the model say.
+        machine.program.ints[MODEL.CONTROLS] = 0
+        first = int(packed.structure[MODEL.WORK_CONTROL])
+        self._driven = machine.w[first : first + len(self.controls)]
+        self._y, self._f = (np.zeros((len(self.states), 1 + DIRECTIONS)) for _ in range(2))
+        self._evaluate = machine.entry("evaluate", self._y, self._f)
+
+    def take(self, p: Array) -> None:
+        """Have the parameters (p,) be these from now on."""
+        self.p = p
+        self.put(self._machine.x[:, 0])
+
+    def put(self, numbers: Array) -> None:
+        """Put what depends on the parameters into numbers (k,) of the model."""
+        if self._parameters:
+            numbers[self._parametric] = self._parameters.base[self._parametric] + self._slopes @ self.p
+
+    def put_along(self, dp: Array, numbers: Array) -> None:
+        """Likewise its derivatives (k, m) along directions of the parameters (p, m)."""
+        numbers[self._parametric] = self._slopes @ dp
+
+    def along(
+        self,
+        t: float,
+        x: Sequence[float] | Array,
+        u: Sequence[float] | Array,
+        dx: Array,
+        du: Array | None = None,
+        dp: Array | None = None,
+        look: Callable[[slice, slice], None] | None = None,
+    ) -> tuple[Array, Array]:
+        """The rates (x,), and their derivatives (x, m) along m directions.
+
+        Args:
+            t: time, s.
+            x: state (x,).
+            u: controls (u,).
+            dx: directions of the state (x, m).
+            du: of the controls (u, m); 0 if left out.
+            dp: of the parameters (p, m); 0 if left out.
+            look: called after each evaluation, with the directions that it had and their places behind a number.
+        """
+        machine, y, f = self._machine, self._y, self._f
+        y[self.state_indices, 0], self._driven[:, 0] = x, u
+        rates, result = np.full(len(x), np.nan), np.full(dx.shape, np.nan)
+        for part, own in batches(dx.shape[1]):
+            machine.begin(t)
+            y[self.state_indices, own] = dx[:, part]
+            if du is not None:
+                self._driven[:, own] = du[:, part]
+            if dp is not None:
+                self.put_along(dp[:, part], machine.x[:, own])
+            if self._evaluate(STAGE.ACCELERATION) == OUTCOME.OK:
+                rates, result[:, part] = f[self.state_indices, 0], f[self.state_indices, own]
+                if look is not None:
+                    look(part, own)
+        if dp is not None:
+            machine.x[:, 1:] = 0.0
+        return rates, result
+
+    @cached_property
+    def output_names(self) -> dict[str, tuple[str, ...]]:
+        """What is known of a state, by groups, and the names of the entries of each; see `CasadiModel.outputs`."""
+        return {group: tuple(labels) for group, (labels, _) in self._outputs().items()}
+
+    def observed(self, t: float, x: Array, u: Array, chosen: Sequence[tuple[str, int]]) -> tuple[Array, Array, Array]:
+        """Outputs (y,), and their derivatives by the state (y, x) and by the controls (y, u).
+
+        Args:
+            t: time, s.
+            x: state (x,).
+            u: controls (u,).
+            chosen: of each output its group, and its place among `output_names` of that.
+        """
+        size = len(x)
+        both = np.eye(size + len(u))
+        y, slopes = np.full(len(chosen), np.nan), np.full((len(chosen), size + len(u)), np.nan)
+
+        def look(part: slice, own: slice) -> None:
+            for place, probe in self._probes:
+                probe(place)
+            known = self._outputs()
+            for row, (group, k) in enumerate(chosen):
+                number = known[group][1][k]
+                y[row] = number
+                slopes[row, part] = number.slopes[: own.stop - 1] if isinstance(number, Carrying) else 0.0
+
+        self.along(t, x, u, both[:size], both[size:], look=look)
+        return y, slopes[:, :size], slopes[:, size:]
+
+    def _outputs(self) -> dict[str, tuple[list[str], list[Any]]]:
+        """Of the state that was evaluated last."""
+        points = [axis for _, _, point in station_places(self.mechanism, self._packed) for axis in point]
+        machine = self._machine
+        found = Seen(machine.program.ints, machine.x, machine.w)
+        return output_columns(self.mechanism, self._packed, self.forces, found, points)
+
+    @cached_property
+    def _probes(self) -> list[tuple[int, Callable[[int], int]]]:
+        """Places of the items of probes, and what computes them."""
+        places, kernels = probe_places(self._packed, self.forces.elements), self._packed.kernels
+        return [(place, self._machine.entry(str(kernels[place + ITEM.LAW]), self._y, self._f)) for place in places]
+
+    def bound(self, t: float, x: Array) -> tuple[Array, Array]:
+        """The derivatives of the errors of constraints at positions (m, x + p) and at speeds (k, x + p).
+
+        They are by the state and by the parameters; in units of the equations, m and rad, m/s and rad/s.
+        """
+        s, w, y, size = self._machine.program.ints, self._machine.w, self._y, len(x)
+        h, freedoms = s[s[MODEL.CONSTRAINED] :], int(s[MODEL.DOFS])
+        count = int(h[CONSTRAINED.EQUATIONS])
+        both = np.eye(size + len(self.p))
+        positions, speeds = np.zeros((count, len(both))), np.zeros((count, len(both)))
+
+        def look(part: slice, own: slice) -> None:
+            rows, errors, rates = (
+                w[h[at] :][: count * each] for at, each in
+                ((CONSTRAINED.WORK_ROWS, freedoms), (CONSTRAINED.WORK_ERRORS, 1), (CONSTRAINED.WORK_RATES, 1))
+            )  # fmt: skip
+            rows, u = rows.reshape(count, freedoms, -1), y[freedoms : 2 * freedoms]
+            positions[:, part] = errors[:, own]
+            moved = np.einsum("ijk,j->ik", rows[:, :, own], u[:, 0]) + rows[:, :, 0] @ u[:, own]
+            speeds[:, part] = moved - rates[:, own]
+
+        self.along(t, x, self.u, both[:size], None, both[size:], look=look)
+        of_places = [
+            row
+            for at in s[h[CONSTRAINED.CONSTRAINT_AT] :][: h[CONSTRAINED.CONSTRAINTS]]
+            for row in range(s[at + CONSTRAINT.FIRST_EQUATION], s[at + CONSTRAINT.END_POSITION])
+        ]
+        return positions[of_places], speeds
+
+    def linear(self, t: float, x: Array, u: Array, p: Array | None = None) -> tuple[Array, Array, Array]:
+        """The rates (x,), and their derivatives by the state (x, x) and by the controls (x, u)."""
+        size = len(x)
+        both = np.eye(size + len(u))
+        if p is not None:
+            self.take(p)
+        rates, found = self.along(t, x, u, both[:size], both[size:])
+        return rates, found[:, :size], found[:, size:]
+
+    def steps(self, controls: Controls, dp: Array) -> Steps:
+        """What follows a motion that controls drive, along directions of the parameters (p, m) and of the start."""
+        packed = pack(self.mechanism, replace(self.forces, controls=controls), apart=self._apart)
+        result, numbers = Steps(packed, self.forces, self.state_indices), packed.numbers.copy()
+        changes = np.zeros((len(numbers), dp.shape[1]))
+        self.put(numbers)
+        self.put_along(dp, changes)
+        result.take(numbers, changes)
+        return result
+
+
+class Seen:
+    """What an evaluation has left, as numbers that carry derivatives.
+
+    Args:
+        model: the structure.
+        reals: the numbers (k, 1 + DIRECTIONS).
+        data: the work vector (k, 1 + DIRECTIONS).
+    """
+
+    on = staticmethod(carried_by)
+
+    def __init__(self, model: Any, reals: Array, data: Array) -> None:
+        self.model, self.reals, self.data = model, DualVector(reals), DualVector(data)
+
+    def sure(self, numbers: Sequence[Any]) -> list[Any]:
+        """Numbers as they are: where the evaluation fails, nobody looks."""
+        return [*numbers]
+
+
+class Steps:
+    """Steps of Merson's method, with derivatives of where they lead by where they begin and by numbers of the model.
+
+    They work on blocks (b, x, 1 + DIRECTIONS): for so many directions at once, in the packed order, states and their
+    derivatives.
+
+    Args:
+        packed: the model with the controls of the motion.
+        forces: of it.
+        places: in the packed order of the states.
+    """
+
+    def __init__(self, packed: Packed, forces: Forces, places: Sequence[int]) -> None:
+        size, self.state_indices = len(places), places
+        method, first = int(packed.structure[MODEL.WORK_SIZE]), int(packed.structure[MODEL.WORK_STATE])
+        # Where constraints bind the motion, no step is good enough to be projected.
+        self._accepted = -1.0 if packed.structure[MODEL.CONSTRAINED] else np.inf
+        self._machine = machine = Machine(packed, forces, ("evaluate", MERSON), merson.HEAD + merson.STATES * size)
+        self._start, self._end = (np.zeros((2 * size, 1 + DIRECTIONS)) for _ in range(2))
+        self._errors, self._h = machine.w[first + ERRORS * size :][:size], machine.w[method:, 0]
+        self._evaluate = machine.entry("evaluate", self._start, self._start[size:])
+        self._step: Callable[[], int] = partial(machine.entry(MERSON, self._start, self._end), method)
+
+    def take(self, numbers: Array, changes: Array) -> None:
+        """Have the numbers of the model (k,) be these from now on, and change so along all directions (k, m)."""
+        self._count, self._number = changes.shape[1], -1
+        self._numbers = [np.zeros(self._machine.x.shape) for _ in batches(self._count)]
+        for (part, own), block in zip(batches(self._count), self._numbers, strict=True):
+            block[:, 0], block[:, own] = numbers, changes[:, part]
+
+    def blocks(self, y: Array, slopes: Array) -> Array:
+        """Of a state (x,) with its derivatives (x, m), in the order of the model."""
+        result = np.zeros((len(self._numbers), len(y), 1 + DIRECTIONS))
+        result[:, self.state_indices, 0] = y
+        for block, (part, own) in zip(result, batches(slopes.shape[1]), strict=True):
+            block[self.state_indices, own] = slopes[:, part]
+        return result
+
+    def slopes(self, blocks: Array) -> Array:
+        """The derivatives (x, m) in blocks."""
+        parts = [block[self.state_indices, own] for block, (_, own) in zip(blocks, batches(self._count), strict=True)]
+        return np.hstack(parts)
+
+    def step(self, t0: float, t1: float, start: Array) -> tuple[Array, Array]:
+        """The blocks of the end of a step, and of the error there; what does not exist is not a number."""
+        end, error, machine, size = np.empty(start.shape), np.empty(start.shape), self._machine, start.shape[1]
+        for number, block in enumerate(start):
+            if self._number != number:
+                self._number, machine.x[:] = number, self._numbers[number]
+            machine.begin(t0)
+            h = self._h
+            h[REACHED], h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED] = t0, t1, t1 - t0, self._accepted
+            self._start[:size] = block
+            self._end[0] = np.nan
+            if self._evaluate(STAGE.ACCELERATION) == OUTCOME.OK:
+                self._step()
+            end[number], error[number] = self._end[:size], self._errors
+        if machine.program.failures:
+            raise machine.program.failures.pop()
+        return end, error
+
+
+def batches(count: int) -> Iterator[tuple[slice, slice]]:
+    """Directions that are taken at once: which of so many, and their places behind a number."""
+    for first in range(0, max(count, 1), DIRECTIONS):
+        size = min(DIRECTIONS, max(count - first, 0))
+        yield slice(first, first + size), slice(1, 1 + size)
+
+
+@cache
+def _code() -> Tangents:
+    return Tangents(DIRECTIONS)

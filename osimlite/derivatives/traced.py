@@ -1,0 +1,212 @@
+"""A packed model evaluated on symbols: the kernels themselves, run on numbers of which some are symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Sequence
+from contextlib import nullcontext
+from functools import reduce
+from typing import Any
+
+from osimlite.derivatives import ways
+from osimlite.derivatives.constraints import dynamics_with
+from osimlite.derivatives.outputs import probe_places
+from osimlite.derivatives.symbolic import on_symbols, standing_in, taken
+from osimlite.derivatives.symbols import Vector, casadi
+from osimlite.errors import UnsupportedError
+from osimlite.mechanics.kernels.constrained_dynamics import bind
+from osimlite.mechanics.kernels.constraint_equations import add_wrench
+from osimlite.mechanics.kernels.dynamics import evaluate, inverse
+from osimlite.mechanics.kernels.layout import CONSTRAINED, ITEM, MODEL, RUN, STAGE, WORK
+from osimlite.mechanics.kernels.pointers import address, call
+from osimlite.mechanics.multibody.functions import Function
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.geometries.load import Load, find_load
+from osimlite.simulation.engines.linking import PYTHON, Program
+from osimlite.simulation.pack import Packed
+
+WRAPS = "its path bends around surfaces; put a FunctionBasedPath that is fitted to it in its place"
+MESH = "a mesh is in contact; take spheres and half spaces"
+CLOSEST = "the point of an ellipsoid that is in contact is searched for; take spheres"
+SURFACES = "what touches is said at the sizes of a state that is known only later; leave simbody_early_return out"
+REFUSED = {
+    "wrapped_path": WRAPS,
+    "geodesic_path": WRAPS,
+    "cable_path": WRAPS,
+    "touch_mesh": MESH,
+    "elastic_foundation_force": MESH,
+    "touch_ellipsoid": CLOSEST,
+    "touch_ellipsoids": CLOSEST,
+    "early_return": SURFACES,
+}
+"""By the names of kernels, why they have no formula, and what to do instead."""
+
+
+class Traced:
+    """What the kernels compute of a state of symbols.
+
+    Args:
+        packed: the model.
+        forces: of it.
+        numbers: of it, some of which may be symbols.
+        t: time, s.
+        y: the state, in the order of the packed model.
+        controls: of the actuators.
+        equations: numbers of those of the constraints that the others follow from.
+        loads: at this time, one after the other as `given_loads` has them; none if they are computed of the time.
+
+    Raises:
+        UnsupportedError: a force has no formula; the message names it.
+    """
+
+    def __init__(
+        self,
+        packed: Packed,
+        forces: Forces,
+        numbers: Sequence[Any],
+        t: Any,
+        y: Sequence[Any],
+        controls: Sequence[Any],
+        equations: Sequence[int] = (),
+        loads: Sequence[Any] = (),
+    ) -> None:
+        self._packed, self._elements, self._loads = packed, forces.elements, loads
+        self.numbers, self._t, self._y, self._controls = numbers, t, y, controls
+        given: dict[int, int] = {}
+        for place, kernel in packed.kernels.items():
+            if not isinstance(kernel, str) and hasattr(kernel, "takes_symbols"):
+                given[place] = address(kernel)  # type: ignore[arg-type]
+                continue
+            if place in packed.owners and (not isinstance(kernel, str) or kernel in REFUSED):
+                reason = REFUSED[kernel] if isinstance(kernel, str) else "it is computed in Python"
+                raise UnsupportedError(f"'{self._path(place)}' has no formula for CasADi: {reason}")
+        self.structure: list[int] = Program(packed, PYTHON).ints.tolist()
+        for place, law_address in given.items():
+            self.structure[place + ITEM.LAW] = law_address
+        # The controls are given, whatever the controllers of the model say.
+        self.structure[MODEL.CONTROLS] = 0
+        if self.structure[MODEL.CONSTRAINED]:
+            law = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.DYNAMICS]
+            self.structure[MODEL.LAWS + law] = address(taken(dynamics_with(equations)))
+
+    def _path(self, item: int) -> str:
+        return self._elements[self._packed.owners[item]].path
+
+    def evaluated(self, stage: int) -> Evaluated:
+        """All that `evaluate` finds up to a stage."""
+        return self.run(lambda model, reals, data, y, f: on_symbols(evaluate)(model, reals, data, y, f, stage))
+
+    def probed(self) -> Evaluated:
+        """All that `evaluate` finds, and after it what the probes do."""
+        places = probe_places(self._packed, self._elements)
+
+        def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector) -> None:
+            on_symbols(evaluate)(model, reals, data, y, f, STAGE.ACCELERATION)
+            for place in places:
+                on_symbols(call)(model[place + ITEM.LAW], model, reals, data, y, f, place)
+
+        return self.run(law)
+
+    def missing(self, udot: Sequence[Any], pushing: Container[str] | None = None) -> Evaluated:
+        """What `inverse` finds for accelerations (n,), if of the forces only those of some paths push."""
+        size, structure = self.structure[MODEL.DOFS], [*self.structure]
+        if pushing is not None:
+            first, count = structure[MODEL.ITEM_AT], structure[MODEL.ITEMS]
+            items = [item for item in structure[first : first + count] if self._path(item) in pushing]
+            structure[MODEL.ITEMS], structure[first : first + len(items)] = len(items), items
+            run = structure[MODEL.RUN_AT]
+            structure[MODEL.RUNS], structure[run + RUN.LAW] = 1, 0
+            structure[run + RUN.FIRST], structure[run + RUN.END] = 0, len(items)
+
+        def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector) -> None:
+            for k in range(size):
+                f[size + k] = udot[k]
+            on_symbols(inverse)(model, reals, data, y, f, 0)
+
+        return self.run(law, structure)
+
+    def bound(self) -> Evaluated:
+        """The equations of the constraints, see `bind`; the result has the wrench of a unit of each on each link."""
+        first = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS]
+        size = self.structure[MODEL.DOFS]
+
+        def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector) -> dict[tuple[int, int], list[Any]]:
+            wrenches: dict[tuple[int, int], list[Any]] = {}
+            kernel = on_symbols(add_wrench)
+
+            def add(model: Vector, data: Vector, link: int, torque: Any, force: Any, row: Vector) -> None:
+                key = (row.first - first) // size, link
+                before = wrenches.get(key, [0.0] * 6)
+                wrenches[key] = [old + new for old, new in zip(before, (*torque, *force), strict=True)]
+                kernel(model, data, link, torque, force, row)
+
+            on_symbols(evaluate)(model, reals, data, y, f, STAGE.VELOCITY)
+            with standing_in(add_wrench, add):
+                on_symbols(bind)(model, reals, data, y, f)
+            return wrenches
+
+        return self.run(law)
+
+    def run(
+        self, law: Callable[[Vector, Vector, Vector, Vector, Vector], Any], structure: list[int] | None = None
+    ) -> Evaluated:
+        """What a function of the five vectors leaves."""
+
+        def run() -> Evaluated:
+            model, reals = Vector(self.structure if structure is None else structure), Vector(list(self.numbers))
+            data, y = Vector([0.0] * self.structure[MODEL.WORK_SIZE]), Vector(list(self._y))
+            f = Vector([0.0] * len(self._y))
+            data[WORK.TIME] = self._t
+            for k, control in enumerate(self._controls):
+                data[self.structure[MODEL.WORK_CONTROL] + k] = control
+            with standing_in(find_load, self._find_load) if self._loads else nullcontext():
+                result = law(model, reals, data, y, f)
+            return Evaluated(model, reals, data, f, result, ways.run.failures)
+
+        try:
+            return ways.repeated(run)
+        except ways.NoFormula as error:
+            named = next((self._path(item) for item in error.items if item in self._packed.owners), "")
+            whose = f"'{named}'" if named else "the model"
+            raise UnsupportedError(
+                f"{whose} has no formula for CasADi: {error}; set its appliesForce to false, or take another class"
+            ) from error
+
+    def _find_load(self, g: Vector, gp: Vector, room: Vector, t: Any) -> None:
+        """As :func:`find_load`, of what is given."""
+        owner = self._packed.owners[max(item for item in self._packed.owners if item <= g.first)]
+        element: Any = self._elements[owner]
+        first = len(given_loads(self._elements[:owner]))
+        for group, functions in enumerate(element.place.groups):
+            for k in range(len(functions)):
+                room[3 * group + k] = self._loads[first + k]
+            first += len(functions)
+
+
+def given_loads(elements: Sequence[Any]) -> list[Function]:
+    """The functions of time of all forces, points and torques that are given."""
+    loads = (element.place for element in elements if isinstance(getattr(element, "place", None), Load))
+    return [function for load in loads for group in load.groups for function in group]
+
+
+class Evaluated:
+    """What an evaluation has left.
+
+    Args:
+        model: the structure.
+        reals: the numbers.
+        data: the work vector.
+        f: derivative of the state, or what stands in its place.
+        result: what the function returned.
+        failures: where one of these holds, there is no result.
+    """
+
+    def __init__(
+        self, model: Vector, reals: Vector, data: Vector, f: Vector, result: Any, failures: Sequence[Any]
+    ) -> None:
+        self.model, self.reals, self.data, self.f, self.result = model, reals, data, f, result
+        self.on, self._failed = on_symbols, reduce(casadi.logic_or, failures) if failures else None
+
+    def sure(self, numbers: Sequence[Any]) -> Any:
+        """Numbers as one column, which are none where the evaluation fails."""
+        column = casadi.SX(casadi.vertcat(*numbers))
+        return column if self._failed is None else casadi.if_else(self._failed, casadi.DM.nan(column.shape), column)

@@ -1,0 +1,256 @@
+"""What each of OpenSim's operators does to a model: one function for each class of the schema.
+
+The results are those of OpenSim's ModelProcessor, names and places included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from osimlite.base.text import did_you_mean
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.io.document.reader import read_document
+from osimlite.io.document.source import Source
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.constraints import Coupler
+from osimlite.schema.actuators import CoordinateActuator
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.forces import Force
+from osimlite.schema.frames import Ground, PhysicalOffsetFrame
+from osimlite.schema.joints import Joint, WeldJoint
+from osimlite.schema.model import Model
+from osimlite.schema.muscles import (
+    DeGrooteFregly2016Muscle,
+    Millard2012EquilibriumMuscle,
+    Muscle,
+    Thelen2003Muscle,
+)
+from osimlite.schema.path_actuators import PathActuator
+from osimlite.schema.prescribed import ExternalLoads
+from osimlite.schema.tools import processors as p
+
+GREY = (0.5, 0.5, 0.5)
+"""Of paths that were muscles'."""
+ALIKE = (
+    "appliesForce",
+    "min_control",
+    "max_control",
+    "max_isometric_force",
+    "optimal_fiber_length",
+    "tendon_slack_length",
+    "pennation_angle_at_optimal",
+    "max_contraction_velocity",
+    "ignore_tendon_compliance",
+    "ignore_activation_dynamics",
+)
+"""What muscles of all classes have."""
+
+Operation = Callable[[Model, Any, Path], None]
+OPERATIONS: dict[type, Operation] = {}
+"""By class, what changes a model as an object of it says; files are looked for from a folder."""
+
+
+def operation(cls: type) -> Callable[[Operation], Operation]:
+    """Declare what an operator does."""
+
+    def declared(function: Operation) -> Operation:
+        OPERATIONS[cls] = function
+        return function
+
+    return declared
+
+
+def muscles(model: Model) -> list[Muscle]:
+    """Of the model's set of forces, in its order."""
+    return [force for force in model.force_set.objects if isinstance(force, Muscle)]
+
+
+SETTINGS: dict[type, tuple[type[Muscle], str, Callable[[Any, Any], object]]] = {
+    p.ModOpIgnoreActivationDynamics: (Muscle, "ignore_activation_dynamics", lambda operator, old: True),
+    p.ModOpIgnoreTendonCompliance: (Muscle, "ignore_tendon_compliance", lambda operator, old: True),
+    p.ModOpScaleMaxIsometricForce: (Muscle, "max_isometric_force", lambda operator, old: old * operator.scale_factor),
+    p.ModOpIgnorePassiveFiberForcesDGF: (
+        DeGrooteFregly2016Muscle, "ignore_passive_fiber_force", lambda operator, old: True,
+    ),
+    p.ModOpScaleActiveFiberForceCurveWidthDGF: (
+        DeGrooteFregly2016Muscle, "active_force_width_scale", lambda operator, old: operator.scale_factor,
+    ),
+    p.ModOpTendonComplianceDynamicsModeDGF: (
+        DeGrooteFregly2016Muscle, "tendon_compliance_dynamics_mode", lambda operator, old: operator.mode,
+    ),
+}  # fmt: skip
+"""By operator, the muscles that it sets a property of, which, and to what: as the operator says, from what it was."""
+
+
+def _set(model: Model, operator: Any, folder: Path) -> None:
+    kind, name, value = SETTINGS[type(operator)]
+    for muscle in model.components(kind):
+        setattr(muscle, name, value(operator, getattr(muscle, name)))
+
+
+OPERATIONS.update(dict.fromkeys(SETTINGS, _set))
+
+
+@operation(p.ModOpRemoveMuscles)
+def _remove(model: Model, operator: Any, folder: Path) -> None:
+    for muscle in muscles(model):
+        _take_out(model, muscle)
+
+
+@operation(p.ModOpReplaceMusclesWithPathActuators)
+def _path_actuators(model: Model, operator: Any, folder: Path) -> None:
+    for muscle in muscles(model):
+        other = PathActuator(name=muscle.name, optimal_force=muscle.max_isometric_force)
+        for name in ("appliesForce", "min_control", "max_control"):
+            setattr(other, name, getattr(muscle, name))
+        _replace(model, muscle, other)
+        if hasattr(other.geometry_path, "appearance"):
+            other.geometry_path.appearance.color = GREY
+
+
+@operation(p.ModOpReplaceMusclesWithDeGrooteFregly2016)
+def _degroote(model: Model, operator: Any, folder: Path) -> None:
+    """Thelen's and Millard's muscles; others are refused, those of the class stay."""
+    for muscle in muscles(model):
+        given: dict[str, Any] = {name: getattr(muscle, name) for name in ALIKE}
+        if isinstance(muscle, Millard2012EquilibriumMuscle):
+            given |= {
+                "fiber_damping": muscle.fiber_damping,
+                "passive_fiber_strain_at_one_norm_force": muscle.FiberForceLengthCurve.strain_at_one_norm_force,
+                "tendon_strain_at_one_norm_force": muscle.TendonForceLengthCurve.strain_at_one_norm_force,
+            }
+        elif isinstance(muscle, Thelen2003Muscle):
+            given |= {
+                "fiber_damping": 0.0,
+                "passive_fiber_strain_at_one_norm_force": muscle.FmaxMuscleStrain,
+                "tendon_strain_at_one_norm_force": muscle.FmaxTendonStrain,
+            }
+        else:
+            raise UnsupportedError(
+                f"'{muscle.name}' is a {type(muscle).__name__}, which has no DeGrooteFregly2016Muscle of the same "
+                "behavior; there is one for Thelen2003Muscle and Millard2012EquilibriumMuscle"
+            )
+        for name in ("default_activation", "activation_time_constant", "deactivation_time_constant"):
+            given[name] = getattr(muscle, name)
+        _replace(model, muscle, DeGrooteFregly2016Muscle(name=muscle.name, **given))
+
+
+def _replace(model: Model, muscle: Muscle, other: Any) -> None:
+    """Take a muscle out, and put something along its path behind all forces, as OpenSim does."""
+    other.geometry_path = muscle.geometry_path.copy_deep()
+    _take_out(model, muscle)
+    model.force_set.objects.append(other)
+
+
+def _take_out(model: Model, muscle: Muscle) -> None:
+    """Out of the set of forces, and of its groups: what takes its place is no member, in OpenSim."""
+    model.force_set.objects.remove(muscle)
+    for group in model.force_set.groups:
+        names = [str(getattr(member, "name", member)).rpartition("/")[2] for member in group.members]
+        group.members = tuple(member for member, name in zip(group.members, names, strict=True) if name != muscle.name)
+
+
+@operation(p.ModOpAddReserves)
+def _reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> None:
+    if operator.optimal_force <= 0.0:
+        raise ModelError(f"reserve actuators have an optimal_force of {operator.optimal_force:g}; give a positive one")
+    if operator.bound is not None and operator.bound < 0.0:
+        raise ModelError(f"reserve actuators have a bound of {operator.bound:g}; give one that is not negative")
+    tree, mechanism = model.tree(), build_mechanism(model)
+    driven = {tree.path_of(item) for item in _driven(model)}
+    dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
+    fixed = {
+        info.path
+        for place, info in enumerate(mechanism.coordinates)
+        if info.locked or info.prescribed is not None or place in dependent
+    }
+    for coordinate in list(model.components(Coordinate)):
+        path = tree.path_of(coordinate) or ""
+        if path in fixed or (operator.skip_coordinates_with_actuators and path in driven):
+            continue
+        if operator.skip_residual_coordinates and _is_on_ground(model, path):
+            continue
+        bound: dict[str, Any] = (
+            {} if operator.bound is None else {"min_control": -operator.bound, "max_control": operator.bound}
+        )
+        reserve = CoordinateActuator(
+            name="reserve" + path.replace("/", "_"), coordinate=coordinate.name, optimal_force=operator.optimal_force,
+            **bound,
+        )  # fmt: skip
+        model.force_set.objects.append(reserve)
+
+
+def _driven(model: Model) -> list[Any]:
+    """The coordinates that an actuator drives."""
+    names = {actuator.coordinate for actuator in model.components(CoordinateActuator)}
+    return [item for item in model.components(Coordinate) if item.name in names]
+
+
+def _is_on_ground(model: Model, path: str) -> bool:
+    """Whether a coordinate is one of a joint to ground."""
+    joint = model.tree().at(path.rpartition("/")[0])
+    return isinstance(_base(model, joint, "socket_parent_frame"), Ground)
+
+
+def _base(model: Model, owner: Any, socket: str) -> Any:
+    """The body, or the ground, that a frame of a socket is fixed to."""
+    tree = model.tree()
+    frame: Any = tree.target(owner, socket, getattr(owner, socket))
+    while isinstance(frame, PhysicalOffsetFrame):
+        frame = tree.target(frame, "socket_parent", frame.socket_parent)
+    return frame
+
+
+@operation(p.ModOpReplaceJointsWithWelds)
+def _welds(model: Model, operator: p.ModOpReplaceJointsWithWelds, folder: Path) -> None:
+    for path in map(str, operator.joint_paths):
+        tree = model.tree()
+        joints = {tree.path_of(item) or "": item for item in model.components(Joint)}
+        names = {item.name: item for item in joints.values()}
+        joint = joints.get(path) or names.get(path) or names.get(path.rpartition("/")[2])
+        if joint is None:
+            raise ModelError(f"the model has no joint '{path}'{did_you_mean(path, [*joints, *names])}")
+        frames: list[PhysicalOffsetFrame] = []
+        for socket in ("socket_parent_frame", "socket_child_frame"):
+            frame, base = tree.target(joint, socket, getattr(joint, socket)), _base(model, joint, socket)
+            offset = PhysicalOffsetFrame(name=f"{base.name}_offset", socket_parent=tree.path_of(base) or "")
+            if isinstance(frame, PhysicalOffsetFrame):
+                offset.translation, offset.orientation = frame.translation, frame.orientation
+            frames.append(offset)
+        one, other = (frame.name for frame in frames)
+        weld = WeldJoint(name=joint.name, socket_parent_frame=one, socket_child_frame=other, frames=frames)
+        model.joint_set.objects.remove(joint)
+        model.joint_set.objects.append(weld)
+
+
+@operation(p.ModOpReplacePathsWithFunctionBasedPaths)
+def _function_paths(model: Model, operator: p.ModOpReplacePathsWithFunctionBasedPaths, folder: Path) -> None:
+    given = read_document(Source.of_file(folder / operator.paths_file.strip()), of=p.FunctionBasedPathSet).top
+    put_paths(model, given.objects)
+
+
+def put_paths(model: Model, paths: Any) -> None:
+    """Give forces other paths, each of which has the path of its force as its name so far.
+
+    Raises:
+        ModelError: there is no such force, or it has no path.
+    """
+    forces = {model.tree().path_of(force) or "": force for force in model.components(Force)}
+    for path in paths:
+        force = forces.get(path.name)
+        if force is None or not hasattr(force, "geometry_path"):
+            raise ModelError(f"the model has no force with a path '{path.name}'{did_you_mean(path.name, [*forces])}")
+        force.geometry_path = path.copy_deep()
+        force.geometry_path.name = "path"
+
+
+@operation(p.ModOpAddExternalLoads)
+def _loads(model: Model, operator: p.ModOpAddExternalLoads, folder: Path) -> None:
+    file = folder / operator.filepath.strip()
+    loads = read_document(Source.of_file(file), of=ExternalLoads).top
+    assert isinstance(loads, ExternalLoads)
+    loads.name = "externalloads"  # OpenSim loses the name that the file says.
+    loads.datafile = str((file.parent / loads.datafile.strip()).absolute())
+    model.add(loads)

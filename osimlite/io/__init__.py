@@ -1,0 +1,1 @@
+"""Text and bytes to objects and back: documents (XML), tables of numbers, and meshes."""

@@ -1,0 +1,98 @@
+"""Documents that were read, kept as long as their files do not change."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from osimlite.base.files import stamped
+from osimlite.errors import OsimliteError
+from osimlite.io.document.objects import layout_of
+from osimlite.io.document.reader import read_document
+from osimlite.io.document.source import Source
+from osimlite.schema.base import Object
+from osimlite.schema.registry import forgotten_with_classes
+
+T = TypeVar("T")
+Top = TypeVar("Top", bound=Object)
+
+
+class Kept(Generic[T]):
+    """What was made of the last `size` files, as long as these do not change; None of one that is not there."""
+
+    def __init__(self, make: Callable[[str], T], size: int) -> None:
+        self._make, self._size = make, size
+        self._kept: dict[str, tuple[int, T]] = {}
+        forgotten_with_classes(self._kept.clear)
+
+    def __call__(self, path: str) -> T | None:
+        """What the file at a path makes."""
+        # A file is the same by a relative and by an absolute path.
+        stamp, place = stamped(path), os.path.abspath(path)
+        if stamp is None:
+            return None
+        known = self._kept.pop(place, None)
+        if known is None or known[0] != stamp:
+            known = stamp, self._make(path)
+        self._kept[place] = known
+        if len(self._kept) > self._size:
+            del self._kept[next(iter(self._kept))]
+        return known[1]
+
+    def has(self, path: str) -> bool:
+        """Whether it is known of a file as it is now."""
+        known = self._kept.get(os.path.abspath(path))
+        return known is not None and known[0] == stamped(path)
+
+    def keep(self, path: str, made: T) -> None:
+        """Keep what somebody else has made of the file at a path, as it is now."""
+        stamp, place = stamped(path), os.path.abspath(path)
+        if stamp is None:
+            return
+        self._kept.pop(place, None)
+        self._kept[place] = stamp, made
+        if len(self._kept) > self._size:
+            del self._kept[next(iter(self._kept))]
+
+
+def while_unchanged(size: int) -> Callable[[Callable[[str], T]], Kept[T]]:
+    """Keep what a function makes of the last `size` files."""
+    return lambda make: Kept(make, size)
+
+
+@while_unchanged(256)
+def top_at(path: str) -> Object | None:
+    """The top of a document; None if it cannot be read."""
+    try:
+        return read_document(Source.of_file(path), of=Object).top
+    except (OsimliteError, ValueError, RecursionError):
+        return None
+
+
+@while_unchanged(256)
+def _is_whole(path: str) -> bool:
+    """Whether no part of a document is in another file, which nobody would see change."""
+    top = top_at(path)
+    return top is not None and not any(item.layout is not None and item.layout.include for item in top.walk())
+
+
+def read_anew(path: str | Path, of: type[Top]) -> Top:
+    """The top of a document, of a class, for whoever changes it: a copy, if it is known from before.
+
+    Raises:
+        DocumentError: the file is missing or holds something else; with line and column.
+    """
+    from osimlite.io.document.plugins import used
+
+    file = str(path)
+    with used(()):
+        top = top_at(file) if top_at.has(file) and _is_whole(file) else None
+        if not isinstance(top, of):
+            document = read_document(Source.of_file(path), of=of)
+            assert isinstance(document.top, of)
+            return document.top
+        copied = top.copy_deep()
+        layout_of(copied).file = file
+        return copied

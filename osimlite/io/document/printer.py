@@ -1,0 +1,223 @@
+"""Objects to text, in OpenSim's layout: one tab a level, properties in catalogue order, only what has been set."""
+
+from __future__ import annotations
+
+from copy import copy
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
+
+from osimlite.base.files import from_folder, write_atomically
+from osimlite.io.document.escape import escape, quoted
+from osimlite.io.document.foreign import relaid
+from osimlite.io.document.lexical import formatter
+from osimlite.schema.base import Component, Object, Unknown
+from osimlite.schema.fields import Held, Reference, Value
+from osimlite.schema.layout import Include, Layout, Remark
+from osimlite.schema.model import CURRENT_VERSION, Model, expect_model
+from osimlite.schema.specs import FieldSpec, defaults, field_specs
+
+Numbers = Literal["shortest", "opensim"]
+DECLARATION = '<?xml version="1.0" encoding="UTF-8" ?>'
+"""What every document begins with."""
+
+
+def to_text(top: Object, *, numbers: Numbers = "shortest", comments: bool = True) -> str:
+    """The document of a model, or of another object that has one of its own, such as the setup of a tool.
+
+    Args:
+        top: what to print; components given as references must be part of it, if it is a model.
+        numbers: ``"shortest"`` prints the shortest decimal that reads back equal, ``"opensim"`` 17 significant digits.
+        comments: whether to print the comments the model was read with.
+
+    Raises:
+        ModelError: a reference leads to a component outside the model.
+    """
+    return _document(_Printer(top, numbers, comments))
+
+
+def write(top: Object, path: str | Path, *, numbers: Numbers = "shortest") -> None:
+    """Write the file of a model or of another object; it appears whole or not at all.
+
+    What was read from a file of its own and is unchanged stays a reference to that file. Arguments and errors as
+    `to_text`.
+    """
+    write_atomically(path, _document(_Printer(top, numbers, True, Path(path).resolve().parent)))
+
+
+def _document(printer: _Printer) -> str:
+    top = printer.top
+    layout = top.layout or Layout()
+    lines = printer.lines
+    lines.append(DECLARATION)
+    printer.comment(layout.prolog, 0)
+    lines.append(f'<OpenSimDocument Version="{CURRENT_VERSION}">')
+    printer.object(top, top.name, 1)
+    lines.append("</OpenSimDocument>")
+    printer.comment(layout.epilog, 0)
+    return "\n".join(lines) + "\n"
+
+
+class _Printer:
+    """Collects the lines of one document; `folder` is where it will stand, if that is known."""
+
+    def __init__(self, top: Object, numbers: str, comments: bool, folder: Path | None = None) -> None:
+        if not isinstance(top, Object) or type(top).abstract:
+            expect_model(top)
+        self.top = top
+        self.tree = top.tree() if isinstance(top, Model) else None
+        self.numbers = numbers
+        self.comments = comments
+        self.folder = folder
+        self.lines: list[str] = []
+        block = top.layout.defaults if top.layout is not None else []
+        self.defaults = {type(item): item for item in reversed(block)}
+
+    def object(self, item: Object, name: str, depth: int) -> None:
+        """Print one object as an element with this name attribute."""
+        indent = "\t" * depth
+        layout = item.layout
+        if layout is not None:
+            self.comment(layout.comments, depth)
+        if isinstance(item, Unknown):
+            self._unknown(item, depth)
+        elif layout is not None and layout.include is not None and layout.include.held == item:
+            self.lines.append(f"{indent}<{item.tag} file={quoted(self._place_of(layout.include))} />")
+        else:
+            head = f"{indent}<{item.tag}" + (f" name={quoted(name)}" if name else "")
+            if layout is not None:
+                head += "".join(f" {key}={quoted(text)}" for key, text in layout.attributes.items())
+            self.lines.append(head + ">")
+            if item is self.top and layout is not None and layout.defaults:
+                self._block(layout.defaults, depth + 1)
+            present = item.model_fields_set
+            default = self.defaults.get(type(item))
+            # What nobody has asked for is no part of the object yet, and need not become one to say nothing.
+            silent = defaults(type(item))[1].keys() - item.__dict__.keys() - present if default is None else set()
+            if silent:
+                silent &= _silent(type(item))
+            for spec in field_specs(type(item)).values():
+                if layout is not None and layout.before and spec.tag in layout.before:
+                    self._remarks(layout.before[spec.tag], depth + 1)
+                if spec.name in silent and (layout is None or spec.name not in layout.inherited):
+                    continue
+                value = getattr(item, spec.name)
+                if (
+                    spec.name in present
+                    or (default is not None and value != getattr(default, spec.name))
+                    or (default is None and layout is not None and spec.name in layout.inherited)
+                    or (default is None and isinstance(spec.kind, Held) and has_content(value, spec))
+                    # A part may start with a value that its class does not have elsewhere, as the axes of a transform.
+                    or (default is None and not isinstance(spec.kind, Held) and value != spec.default == spec.default)
+                ):
+                    self._property(item, spec, value, depth + 1)
+            if layout is not None and None in layout.before:
+                self._remarks(layout.before[None], depth + 1)
+            self.lines.append(f"{indent}</{item.tag}>")
+        if layout is not None and layout.after:
+            self._remarks(layout.after, depth)
+
+    def _block(self, block: list[Object], depth: int) -> None:
+        """Print a ``<defaults>`` block; what is equal to it is not printed on the objects themselves."""
+        defaults, self.defaults = self.defaults, {}
+        self.lines.append("\t" * depth + "<defaults>")
+        for item in block:
+            if self.numbers == "opensim":
+                # Here OpenSim writes out all that a class has in its first property system.
+                item = copy(item)
+                item.model_fields_set.update(spec.name for spec in field_specs(type(item)).values() if spec.legacy)
+            self.object(item, item.name, depth + 1)
+        self.lines.append("\t" * depth + "</defaults>")
+        self.defaults = defaults
+
+    def _unknown(self, item: Unknown, depth: int) -> None:
+        if item.content:
+            self.lines.extend(relaid(item.content, depth, comments=self.comments, name=item.name))
+        else:
+            name = f" name={quoted(item.name)}" if item.name else ""
+            self.lines.append("\t" * depth + f"<{item.class_name}{name} />")
+
+    def _place_of(self, include: Include) -> str:
+        """The file of an included object as it is found from where the document will stand."""
+        if self.folder is None or Path(self.folder, include.file).resolve() == Path(include.path):
+            return include.file
+        return from_folder(include.path, self.folder)
+
+    def _property(self, item: Object, spec: FieldSpec, value: Any, depth: int) -> None:
+        kind = spec.kind
+        indent = "\t" * depth
+        if not isinstance(kind, Held):
+            if value is None and not (isinstance(kind, Value) and kind.scalar != "string"):
+                return  # An empty element would be an empty text.
+            text = self._text(item, spec, value)
+            # OpenSim closes what is empty in its first property system like this, and all else with an end tag.
+            short = not text and spec.legacy
+            self.lines.append(f"{indent}<{spec.tag} />" if short else f"{indent}<{spec.tag}>{text}</{spec.tag}>")
+        elif kind.form == "single" and not (isinstance(value, Unknown) and value.class_name in field_specs(type(item))):
+            self.object(value, spec.tag, depth)
+        elif kind.form == "unnamed":
+            self.object(value, value.name, depth)
+        else:
+            members = value if isinstance(value, list) else [] if value is None else [value]
+            if not members:
+                self.lines.append(f"{indent}<{spec.tag} />")
+                return
+            self.lines.append(f"{indent}<{spec.tag}>")
+            for member in members:
+                self.object(member, member.name, depth + 1)
+            self.lines.append(f"{indent}</{spec.tag}>")
+
+    def _text(self, item: Object, spec: FieldSpec, value: Any) -> str:
+        if isinstance(spec.kind, Reference):
+            value = self._named(item, spec.kind, value)
+        layout: Layout | None = item.layout
+        if layout is not None and spec.name in layout.raw:
+            read_as, raw = layout.raw[spec.name]
+            if read_as is value or read_as == value:
+                return escape(raw)
+        return escape(formatter(spec.kind, self.numbers)(value))
+
+    def _named(self, item: Object, reference: Reference, value: Any) -> Any:
+        if isinstance(value, Component):
+            if self.tree is None:
+                return value.path if reference.rule == "socket" or "path" in reference.rule else value.name
+            return self.tree.text_for(self.tree.owner_of(item), reference, value)
+        if isinstance(value, tuple):
+            return tuple(self._named(item, reference, word) for word in value)
+        return "" if value is None else value
+
+    def _remarks(self, remarks: list[Remark], depth: int) -> None:
+        for remark in remarks:
+            if remark.element:
+                self.lines.extend(relaid(remark.text, depth, comments=self.comments))
+            else:
+                self.comment([remark.text], depth)
+
+    def comment(self, texts: list[str], depth: int) -> None:
+        """Print comments, one a line."""
+        if self.comments:
+            indent = "\t" * depth
+            self.lines.extend(f"{indent}<!--{text}-->" for text in texts)
+
+
+@cache
+def _silent(cls: type[Object]) -> frozenset[str]:
+    """The properties of a class whose objects and lists, as they are made for it, are not printed."""
+    made = defaults(cls)[1]
+    held = (spec for spec in field_specs(cls).values() if spec.name in made and isinstance(spec.kind, Held))
+    return frozenset(spec.name for spec in held if not has_content(made[spec.name](), spec))
+
+
+def has_content(value: Any, spec: FieldSpec | None = None) -> bool:
+    """Whether an object or list that no one assigned holds something all the same; the object by its property."""
+    if isinstance(value, list):
+        return bool(value)
+    if not isinstance(value, Object):
+        return False
+    form = spec.kind.form if spec is not None and isinstance(spec.kind, Held) else ""
+    if form == "list" or (form == "optional" and spec is not None and spec.factory is None):
+        # What nothing puts there is content even if nothing in it was set: a marker at the origin in a set of one.
+        return True
+    if value.model_fields_set - {"name"} or value.layout is not None:
+        return True
+    return any(has_content(held, inner) for inner, held in value.objects_held())

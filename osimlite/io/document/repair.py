@@ -1,0 +1,263 @@
+"""Text that is not quite XML, read where its meaning is certain.
+
+No repair adds or removes a line or an element, so that every position stays what it was: each puts something else in
+place of characters of one line, or spaces in place of what stands in no element. What could mean two things is refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from html.entities import html5
+from typing import NamedTuple
+
+from lxml import etree
+
+from osimlite.errors import NotWellFormedError
+from osimlite.io.document.names import ATTRIBUTE, as_written
+from osimlite.io.document.notes import Note, NoteKind
+from osimlite.io.document.source import Source
+from osimlite.io.document.spans import markup
+from osimlite.io.document.syntax import expect_plain_doctype
+
+_MARK = re.compile(r"^(?:<{7}|>{7})(?=[ \r]|$).*", re.MULTILINE)
+_HYPHENS = re.compile(r"-{2,}|-\Z")
+# OpenSim too refuses a number without its end.
+_AMPERSAND = re.compile(r"&(?!#(?!x?;))(?:([A-Za-z][A-Za-z0-9]{0,31});)?")
+_OWN_ENTITIES = frozenset(("amp", "lt", "gt", "quot", "apos"))
+_NO_CHARACTER = re.compile("[\x01-\x08\x0e-\x1f\ufffe\uffff]")
+_NUMBERED = re.compile(r"&#(?:x([0-9a-fA-F]+)|([0-9]+));")
+_VALUE = re.compile(
+    r"\"[^\"]*\"|'[^']*'|"
+    r"(?<=\s)(?P<name>[^\s=\"'<>/]+)\s*=(?:\s*(?P<bare>[^\s=\"'<>/]+)(?=[\s/>])|(?=\s*/?>))"
+)
+_TOUCHING = re.compile(r"(?:\"[^\"]*\"|'[^']*')(?=[^\s/>?\"'])")
+_SOUND_DECLARATION = re.compile(
+    r"<\?xml\s+version\s*=\s*([\"'])1\.[0-9]+\1(?:\s+encoding\s*=\s*([\"'])[A-Za-z][\w.-]*\2)?"
+    r"(?:\s+standalone\s*=\s*([\"'])(?:yes|no)\3)?\s*\?>",
+    re.ASCII,
+)
+_OPEN_DECLARATION = re.compile(r"[\s\ufeff]*(<\?xml\b[^<>]*>)(?<!\?>)")
+_NAMED = re.compile(r"<\?[^\W\d][\w.:-]*(?:\s|\?>)")
+_ENDING = re.compile(r"\]\]>")
+_XML_IN_CAPITALS = re.compile(r"<\?xml(?![\w.:-])", re.IGNORECASE)
+_REPLACEMENT = "\ufffd"
+_BLANK_CONTROLS = re.compile("[\f\v]")
+_DECLARATION = re.compile(r"<\?xml\s")
+_SPECIAL = re.compile(r"<!(?:--|\[CDATA\[)")
+_EN_DASH = "\u2013"
+
+
+class Repair(NamedTuple):
+    """One thing read as what it must have meant: where it stands in the text, the word there, what it counts as."""
+
+    kind: NoteKind
+    offset: int
+    word: str
+    meant: str
+
+
+def read_repaired(
+    source: Source, fault: NotWellFormedError, parse: Callable[[Source], etree._Element]
+) -> tuple[etree._Element, list[Note]]:
+    """Parse a text that the parser has refused with `fault`, and note what had to be read as something else.
+
+    Raises:
+        NotWellFormedError: nothing certain can be done; with the line and column of what is wrong.
+    """
+    mark = _MARK.search(source.text)
+    if mark is not None:
+        said = f"'{mark[0].rstrip()[:40]}' is a mark it left; keep one side and take the marks out"
+        raise source.fault(NotWellFormedError, f"an unfinished merge: {said}", source.position(mark.start()))
+    unended = _unended(source.text)
+    if unended is not None:
+        message = "not well-formed XML: what begins here with '<!' has no end"
+        raise source.fault(NotWellFormedError, message, source.position(unended))
+    expect_plain_doctype(source)
+    text, repairs = repaired(source.text)
+    if not repairs or not source.spans:
+        raise fault
+    root = parse(Source(text.encode("utf-8", "replace"), source.file))
+    spans = source.spans
+    tags = [element.tag for element in root.iter(etree.Element)]
+    if len(tags) != len(spans) or any(span.tag != as_written(tag) for span, tag in zip(spans, tags, strict=True)):
+        raise fault
+    notes = []
+    repairs.sort(key=lambda repair: repair.offset)
+    for repair, number in zip(repairs, elements_at(source, [repair.offset for repair in repairs]), strict=True):
+        line = source.position(repair.offset).line
+        notes.append(Note(repair.kind, number, repair.word, value=repair.meant, line=line))
+    return root, notes
+
+
+def elements_at(source: Source, offsets: Sequence[int]) -> Iterator[int]:
+    """Yield the number of the innermost element around each of some characters; 0, the root, outside all.
+
+    Args:
+        source: the text.
+        offsets: of the characters, rising.
+    """
+    spans, count, following = source.spans, len(source.spans), 0
+    around: list[int] = []
+    for offset in offsets:
+        while following < count and spans[following].start <= offset:
+            while around and spans[around[-1]].end <= spans[following].start:
+                around.pop()
+            around.append(following)
+            following += 1
+        while around and spans[around[-1]].end <= offset:
+            around.pop()
+        yield around[-1] if around else 0
+
+
+def repaired(text: str) -> tuple[str, list[Repair]]:
+    """The text with everything mended whose meaning is certain, and what was mended."""
+    repairs: list[Repair] = []
+    for match in _BLANK_CONTROLS.finditer(text):
+        repairs.append(Repair("control-character", match.start(), f"\\x{ord(match[0]):02x}", " "))
+    text = _BLANK_CONTROLS.sub(" ", text)
+    for match in _NO_CHARACTER.finditer(text):
+        repairs.append(Repair("overlooked", match.start(), match[0], "OpenSim keeps it"))
+    text = _NO_CHARACTER.sub(_REPLACEMENT, text)
+    unended = _OPEN_DECLARATION.match(text)
+    if unended is not None:
+        repairs.append(Repair("overlooked", unended.start(1), unended[1], "OpenSim passes over it"))
+        text = _blanked(unended[0]) + text[unended.end() :]
+    pieces: list[str] = []
+    place = depth = 0
+    for kind, start, end, _ in markup(text, as_opensim=True):
+        gap, piece = text[place:start], text[start:end]
+        pieces.append(_outside(gap, place, repairs) if not depth else _ampersands(gap, place, repairs))
+        if kind == "comment":
+            piece = _comment(piece, start, repairs)
+        elif kind == "instruction":
+            if _DECLARATION.match(piece) and place > 0:
+                repairs.append(Repair("late-declaration", start, piece, ""))
+                piece = _blanked(piece)
+            elif _is_no_instruction(piece):
+                repairs.append(Repair("overlooked", start, piece, "OpenSim passes over it"))
+                piece = _blanked(piece)
+        elif kind in ("open", "empty"):
+            depth += kind == "open"
+            piece = _quoted(_ampersands(_attributes(piece, start, repairs), start, repairs), start, repairs)
+        elif kind == "close":
+            if not depth:
+                repairs.append(Repair("overlooked", start, piece, "OpenSim passes over it"))
+                piece = _blanked(piece)
+            depth = max(0, depth - 1)
+        pieces.append(piece)
+        place = end
+    pieces.append(_outside(text[place:], place, repairs) if not depth else text[place:])
+    return "".join(pieces), repairs
+
+
+def _unended(text: str) -> int | None:
+    """Where a comment or its like begins that never ends."""
+    place = 0
+    for _, _, end, _ in markup(text, as_opensim=True):
+        place = end
+    result = _SPECIAL.search(text, place)
+    return None if result is None else result.start()
+
+
+def _blanked(text: str) -> str:
+    """As many spaces, the line ends kept."""
+    return re.sub(r"[^\r\n]", " ", text)
+
+
+def _outside(text: str, offset: int, repairs: list[Repair]) -> str:
+    """Text before or after the root: it belongs to nothing."""
+    before, nul, _ = text.partition("\0")
+    if offset and nul and not before.strip():
+        repairs.append(Repair("overlooked", offset + len(before), nul, "OpenSim reads no further"))
+        return _blanked(text)
+    stripped = text.strip("\ufeff \t\r\n")
+    if offset and stripped.startswith("<?") and ">" not in stripped:
+        repairs.append(Repair("overlooked", offset + text.index("<?"), stripped[:40], "OpenSim reads no further"))
+    elif stripped and "<" not in stripped:
+        word = stripped.splitlines()[0][:40]
+        repairs.append(Repair("text-outside-root", offset + text.index(stripped), word, ""))
+    elif not stripped and "\ufeff" in text:
+        repairs.append(Repair("byte-order-mark", offset + text.index("\ufeff"), "\ufeff", ""))
+    else:
+        return text
+    return _blanked(text)
+
+
+def _comment(piece: str, offset: int, repairs: list[Repair]) -> str:
+    """A comment may not have two hyphens in a row, nor end with one: dashes look the same."""
+    inner = piece[4:-3]
+    result = _HYPHENS.search(inner)
+    if result is None:
+        return piece
+    repairs.append(Repair("hyphens-in-comment", offset + 4 + result.start(), result[0], _EN_DASH * len(result[0])))
+    return f"<!--{_HYPHENS.sub(lambda match: _EN_DASH * len(match[0]), inner)}-->"
+
+
+def _attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
+    """Of an attribute that stands twice the last one counts, as for OpenSim."""
+    given = list(ATTRIBUTE.finditer(piece))
+    last = {match["name"]: match for match in given}
+    for match in given:
+        kept = last[match["name"]]
+        if match is not kept:
+            repairs.append(Repair("duplicate-attribute", offset + match.start(), match["name"], kept[0]))
+            piece = piece[: match.start()] + _blanked(match[0]) + piece[match.end() :]
+    return piece
+
+
+def _is_no_instruction(piece: str) -> bool:
+    """Whether what stands between ``<?`` and ``>`` is neither a declaration nor an instruction of XML."""
+    if not piece.endswith("?>"):
+        return True
+    if _DECLARATION.match(piece):
+        return _SOUND_DECLARATION.fullmatch(piece) is None
+    return _NAMED.match(piece) is None or _XML_IN_CAPITALS.match(piece) is not None
+
+
+def _quoted(piece: str, offset: int, repairs: list[Repair]) -> str:
+    """A start tag in which every value of an attribute stands in quotes and a blank before every name."""
+
+    def quote(match: re.Match[str]) -> str:
+        if match["name"] is None:
+            return match[0]
+        meant = "OpenSim takes it for quoted" if match["bare"] else "OpenSim takes its value for empty"
+        repairs.append(Repair("overlooked", offset + match.start(), match[0], meant))
+        return f'{match["name"]}="{match["bare"] or ""}"'
+
+    def part(match: re.Match[str]) -> str:
+        repairs.append(Repair("overlooked", offset + match.start(), match[0], "OpenSim needs no blank behind it"))
+        return f"{match[0]} "
+
+    return _VALUE.sub(quote, _TOUCHING.sub(part, piece)) if "=" in piece else piece
+
+
+def _ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
+    """Text in which an ampersand that begins no reference stands for itself, as does what would end a CDATA section.
+
+    HTML's references mean what they mean in HTML; of a number that is no character OpenSim keeps a byte.
+    """
+    if "]]>" in text:
+        repairs += [Repair("overlooked", offset + m.start(), m[0], "OpenSim keeps it") for m in _ENDING.finditer(text)]
+        text = text.replace("]]>", "]]&gt;")
+    if "&" not in text:
+        return text
+
+    def number(match: re.Match[str]) -> str:
+        value = int(match[1], 16) if match[1] else int(match[2])
+        if value in (9, 10, 13) or 32 <= value < 0xD800 or 0xE000 <= value < 0xFFFE or 0x10000 <= value < 0x110000:
+            return match[0]
+        repairs.append(Repair("overlooked", offset + match.start(), match[0], "OpenSim makes a byte of it"))
+        return _REPLACEMENT
+
+    def mend(match: re.Match[str]) -> str:
+        name = match[1]
+        if name in _OWN_ENTITIES:
+            return match[0]
+        meant = html5.get(f"{name};") if name else None
+        repairs.append(Repair("bare-ampersand", offset + match.start(), match[0], meant or match[0]))
+        if meant is None:
+            return "&amp;" + match[0][1:]
+        return meant.replace("\n", " ").replace("&", "&amp;").replace("<", "&lt;")
+
+    return _AMPERSAND.sub(mend, _NUMBERED.sub(number, text))

@@ -1,0 +1,69 @@
+"""What the XML parser says against a text, in plain words and in the right place."""
+
+from __future__ import annotations
+
+import re
+
+from osimlite.errors import NotWellFormedError
+from osimlite.io.document.names import as_written
+from osimlite.io.document.source import Position, Source
+from osimlite.io.document.spans import markup
+
+_PLAIN = (
+    (r"Opening and ending tag mismatch: (\S+) line (\d+) and (\S+)", r"<\1> of line \2 is not closed before </\3>"),
+    (r"Premature end of data in tag (\S+) line (\d+)", r"the file ends before <\1> of line \2 is closed"),
+    (r"Couldn't find end of Start Tag (\S+)(?: line \d+)?", r"the tag <\1 has no '>'"),
+    (r"EndTag: '</' not found", "the file ends before its elements are closed"),
+    (r"Failed to parse QName '(.*)'", r"'\1' is no name of an element or attribute"),
+    (r"StartTag: invalid element name", "no tag begins with this '<'; write &lt; for the character itself"),
+    (r"Extra content at the end of the document", "something follows after the root element has ended"),
+    (r"Specification mandates value for attribute (\S+)", r"the attribute \1 has no value"),
+    (r"AttValue: \" or ' expected", "the value of an attribute stands in quotes"),
+    (r"AttValue: ' expected", "the value of an attribute has no closing quote"),
+    (r"Unescaped '<' not allowed in attributes values", "no '<' may stand in an attribute, nor a quote be left out"),
+    (r"attributes construct error", "blanks belong between attributes"),
+    (
+        r"(?:PCDATA i|I|xmlParse\w+: i)nvalid (?:xml)?Char(?: value)? (\d+).*",
+        r"no character of number \1 may stand in XML",
+    ),
+)
+
+
+_PLAIN_DOCTYPE = re.compile(r"<!DOCTYPE(?:[^\[>\"']|\"[^\">]*\"|'[^'>]*'|\[[^\]<>\"']*\])*+>")
+"""A DOCTYPE that ends at its first ``>``, so that it declares nothing."""
+
+
+def expect_plain_doctype(source: Source) -> None:
+    """Refuse a DOCTYPE that declares something, or for another reason does not end at its first ``>``.
+
+    Raises:
+        NotWellFormedError: there is one; with its place.
+    """
+    start = next((piece.start for piece in markup(source.text) if piece.kind == "doctype"), None)
+    if start is not None and _PLAIN_DOCTYPE.match(source.text, start) is None:
+        message = "OpenSim takes the first '>' in a DOCTYPE for its end and cannot load the file; remove the DOCTYPE"
+        raise source.fault(NotWellFormedError, message, source.position(start))
+
+
+def plain_words(message: str) -> str:
+    """The parser's message without its place, and readable."""
+    message = " ".join(as_written(re.sub(r", line \d+, column \d+$", "", message)).split())
+    for pattern, words in _PLAIN:
+        match = re.fullmatch(pattern, message)
+        if match is not None:
+            return match.expand(words)
+    return message
+
+
+def place_of(source: Source, line: int, column: int, message: str) -> Position:
+    """Where in the text the parser gave up, when it says `line` and `column` of what it was given.
+
+    After a wrong closing tag it stands behind it.
+    """
+    lines = source.lines
+    line = min(max(line, 1), len(lines))
+    text = lines[line - 1]
+    column = min(max(column, 1), len(text) + 1)
+    if "tag mismatch" in message:
+        column = max(text.rfind("</", 0, column - 1), 0) + 1
+    return Position(line, max(1, min(column, len(text))))

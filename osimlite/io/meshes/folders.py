@@ -1,0 +1,95 @@
+"""Where the mesh files of a model are: the folders that OpenSim looks into, and names in other capitals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from osimlite.base.files import NAMED_SO, named_mesh_folders
+from osimlite.base.records import dataclass
+from osimlite.errors import OsimliteError
+
+
+class OutsideError(OsimliteError):
+    """A model names a file outside the folders that its meshes may come from."""
+
+
+@dataclass(frozen=True)
+class MeshFolders:
+    """Where the mesh files of a model may be."""
+
+    beside: Path | None = None  # the folder of the model's file; None if it has none
+    named: Sequence[str | Path] = ()  # folders that the user names; those in the environment variable follow them
+
+    @property
+    def searched(self) -> tuple[Path, ...]:
+        """In OpenSim's order: the model's folder, its folder ``Geometry``, then those that the user names."""
+        own = () if self.beside is None else (self.beside, self.beside / "Geometry")
+        return (*own, *self._trusted_elsewhere)
+
+    @property
+    def _trusted_elsewhere(self) -> tuple[Path, ...]:
+        return (*map(Path, self.named), *named_mesh_folders())
+
+    def find(self, name: str) -> Path | None:
+        """The first file of this name; failing that, one spelled with other capitals or slashes; None without any.
+
+        A model is not to be trusted with what else is on the machine: wherever an absolute name, ``..`` or a link
+        leads, the file itself is in the model's folder or in one that the user names.
+
+        Args:
+            name: relative to a folder, or absolute.
+
+        Raises:
+            OutsideError: there is such a file, but it is elsewhere.
+        """
+        elsewhere = None
+        for path in _candidates(name, self.searched):
+            if self._holds(path):
+                return path
+            elsewhere = elsewhere or path
+        if elsewhere is not None:
+            raise OutsideError(
+                f"the file '{name}' is in '{elsewhere.resolve().parent}', outside the model's folder; if you trust the "
+                f"model, name that folder {NAMED_SO}"
+            )
+        return None
+
+    def _holds(self, path: Path) -> bool:
+        roots = self._trusted_elsewhere if self.beside is None else (self.beside, *self._trusted_elsewhere)
+        return any(path.resolve().is_relative_to(root.resolve()) for root in roots)
+
+
+def _candidates(name: str, folders: Sequence[Path]) -> Iterator[Path]:
+    if Path(name).is_absolute():
+        folders = (Path(),)
+    yield from (folder / name for folder in folders if _is_file(folder / name))
+    if not Path(name).is_absolute():
+        parts = Path(name.replace("\\", "/")).parts
+        yield from (result for folder in folders for result in _descend(folder, parts))
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        # A name that is too long, or has a character that no file name has.
+        return False
+
+
+def _descend(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
+    """The files below a folder whose path has these parts, in any capitals."""
+    if not parts:
+        if _is_file(folder):
+            yield folder
+        return
+    if parts[0] == "..":
+        yield from _descend(folder / "..", parts[1:])
+        return
+    try:
+        entries = sorted(folder.iterdir())
+    except OSError:
+        return
+    for entry in entries:
+        if entry.name.casefold() == parts[0].casefold():
+            yield from _descend(entry, parts[1:])

@@ -1,0 +1,99 @@
+"""Reading Wavefront OBJ files: their points, faces and normals; everything else is passed over."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import numpy as np
+
+from osimlite.errors import OsimliteError
+from osimlite.io.meshes.surface import Array, Indices, Polygons, Surface, triangulated
+
+
+def read_obj(content: bytes, name: str) -> Surface:
+    """The surface in an OBJ file, its polygons cut into triangles, with normals if every corner has one.
+
+    Arguments and errors as those of :func:`obj_polygons`.
+    """
+    polygons, normals, chosen = _parsed(content, name)
+    if normals is None:
+        return Surface(polygons.points, triangulated(*polygons))
+    # A surface has one normal at each point: where faces disagree, the point is there once for each of its normals.
+    pairs, corners = np.unique(np.column_stack((polygons.corners, chosen)), axis=0, return_inverse=True)
+    points = polygons.points[pairs[:, 0]]
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    unit = normals / np.where(lengths > 0.0, lengths, 1.0)
+    return Surface(points, triangulated(points, corners.reshape(-1), polygons.ends), unit[pairs[:, 1]])
+
+
+def obj_polygons(content: bytes, name: str) -> Polygons:
+    """The polygons in an OBJ file.
+
+    Args:
+        content: of the file.
+        name: of the file, for messages.
+
+    Raises:
+        OsimliteError: a point or a face is damaged, or there is no face; with the line.
+    """
+    return _parsed(content, name)[0]
+
+
+def _parsed(content: bytes, name: str) -> tuple[Polygons, Array | None, Indices]:
+    """Polygons, normals (m, 3), None unless every corner has one, and which of them each corner has."""
+    points: list[tuple[float, float, float]] = []
+    normals: list[list[str]] = []
+    corners: list[int] = []
+    chosen: list[int] = []
+    ends: list[int] = []
+    lines = content.decode("utf-8", errors="replace").replace("\\\n", " ").splitlines()
+    for number, line in enumerate(lines, start=1):
+        kind, *words = line.split() or [""]
+        try:
+            if kind == "v":
+                x, y, z = (float(word) for word in words[:3])
+                points.append((x, y, z))
+            elif kind == "vn":
+                normals.append(words[:3])
+            elif kind == "f":
+                for word in words:
+                    point, _, normal = (*word.split("/"), "", "")[:3]
+                    corners.append(_place(point, len(points)))
+                    with suppress(ValueError):
+                        chosen.append(_place(normal, len(normals)))
+                ends.append(len(corners))
+        except ValueError:
+            raise OsimliteError(f"this is no {'point' if kind == 'v' else 'face'}", file=name, line=number) from None
+    if not corners:
+        raise OsimliteError("it is not an OBJ file with faces; save it again", file=name)
+    if max(corners) >= len(points):
+        raise OsimliteError("a face names a point that is not there; save it again", file=name)
+    result = np.array(points)
+    if not np.isfinite(result).all():
+        raise OsimliteError("a point is not three finite numbers; save it again", file=name)
+    polygons = Polygons(result, np.array(corners, dtype=np.int64), np.array(ends, dtype=np.int64))
+    if len(chosen) < len(corners) or max(chosen) >= len(normals):
+        return polygons, None, polygons.corners
+    return polygons, _vectors(normals), np.array(chosen, dtype=np.int64)
+
+
+def _place(word: str, count: int) -> int:
+    """From 0 on; numbers count from 1, negative ones back from the last so far.
+
+    Raises:
+        ValueError: there is no such place.
+    """
+    number = int(word)
+    place = number - 1 if number > 0 else count + number
+    if number == 0 or place < 0:
+        raise ValueError
+    return place
+
+
+def _vectors(rows: list[list[str]]) -> Array | None:
+    """Rows of three finite numbers as an array; None if they are not."""
+    try:
+        result = np.array(rows, dtype=np.float64)
+    except ValueError:
+        return None
+    return result if result.shape == (len(rows), 3) and np.isfinite(result).all() else None

@@ -1,0 +1,130 @@
+"""Surfaces of triangles: polygons cut into triangles, and the text of a Wavefront OBJ file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from osimlite.base.records import dataclass
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+class Polygons(NamedTuple):
+    """Polygons of any number of corners."""
+
+    points: Array  # (n, 3)
+    corners: Indices  # of all polygons, one after the other (places of points), counter-clockwise seen from outside
+    ends: Indices  # where each polygon ends in `corners`, increasing
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A surface of triangles."""
+
+    points: Array  # (n, 3)
+    triangles: Indices  # (t, 3) places of points, counter-clockwise seen from outside
+    normals: Array | None = None  # outward unit vectors at the points (n, 3), or None
+    is_closed: bool = False  # whether it is known that nobody sees its inside
+
+    def stretched(self, factors: Sequence[float]) -> Surface:
+        """The surface with its coordinates multiplied by `factors` (3,), and its outside still outside."""
+        a, b, c = factors
+        turned = a * b * c < 0.0
+        triangles, normals = self.triangles[:, ::-1] if turned else self.triangles, self.normals
+        if normals is not None:
+            # They are stretched the other way, by 1/a, 1/b, 1/c; these products serve what is flat too.
+            normals = normals * np.array((b * c, c * a, a * b)) * (-1.0 if turned else 1.0)
+            lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+            normals = normals / np.where(lengths > 0.0, lengths, 1.0)
+        return Surface(self.points * np.array(factors), triangles, normals, self.is_closed)
+
+    def obj(self) -> str:
+        """The text of an OBJ file."""
+        lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in self.points.tolist()]
+        corners = (self.triangles + 1).tolist()
+        if self.normals is None:
+            lines += [f"f {a} {b} {c}" for a, b, c in corners]
+        else:
+            lines += [f"vn {x:.6g} {y:.6g} {z:.6g}" for x, y, z in self.normals.tolist()]
+            lines += [f"f {a}//{a} {b}//{b} {c}//{c}" for a, b, c in corners]
+        return "\n".join(lines) + "\n"
+
+
+MAX_EAR_WORK = 250_000
+"""Sum of the squares of the corners of polygons that are cut at their ears, which takes ten seconds at most.
+
+Polygons beyond that are cut from one corner, which is right of convex ones. Meshes of bones have
+triangles; a polygon of a million corners would take years."""
+
+
+def triangulated(points: Array, corners: Indices, ends: Indices) -> Indices:
+    """Triangles (t, 3) that cover polygons, turning the same way.
+
+    Args:
+        points: (n, 3).
+        corners: of all polygons, one after the other (places of points).
+        ends: where each polygon ends in `corners`, increasing; polygons of fewer than three corners are left out.
+    """
+    starts = np.concatenate(([0], ends[:-1])).astype(np.int64)
+    sizes = ends - starts
+    parts = [corners[starts[sizes == 3][:, None] + np.arange(3)]]
+    quads = corners[starts[sizes == 4][:, None] + np.arange(4)]
+    if len(quads):
+        parts.append(_halves(points, quads))
+    work = 0
+    for start, end in zip(starts[sizes > 4].tolist(), ends[sizes > 4].tolist(), strict=True):
+        polygon = corners[start:end]
+        work += (end - start) ** 2
+        cut = _ears if work <= MAX_EAR_WORK else _fan
+        parts.append(polygon[cut(points[polygon])])
+    return np.concatenate(parts).reshape(-1, 3)
+
+
+def strip_triangles(strip: Indices) -> Indices:
+    """Triangles (k - 2, 3) of a strip of k points, of which every second is turned the other way."""
+    triangles = np.lib.stride_tricks.sliding_window_view(strip, 3).copy()
+    triangles[1::2, :2] = triangles[1::2, 1::-1]
+    return triangles
+
+
+def _halves(points: Array, quads: Indices) -> Indices:
+    """Two triangles for each of k quadrilaterals (2 k, 3): cut where both halves turn the same way."""
+    a, b, c, d = (points[quads[:, index]] for index in range(4))
+    agreement = np.einsum("ij,ij->i", np.cross(b - a, c - a), np.cross(c - a, d - a))
+    cut = np.where((agreement < 0.0)[:, None], (1, 2, 3, 1, 3, 0), (0, 1, 2, 0, 2, 3))
+    return np.take_along_axis(quads, cut, axis=1).reshape(-1, 3)
+
+
+def _fan(corners: Array) -> Indices:
+    """Return triangles (k - 2, 3) of a polygon of k corners (k, 3) from its first corner to all others."""
+    others = np.arange(1, len(corners) - 1)
+    return np.stack([np.zeros_like(others), others, others + 1], axis=1)
+
+
+def _ears(corners: Array) -> Indices:
+    """Triangles (k - 2, 3) of a polygon of k corners (k, 3): corners are cut off that hold no other corner."""
+    # Twice the area vector (Newell).
+    normal: Array = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+    left = list(range(len(corners)))
+    triangles: list[tuple[int, int, int]] = []
+    while len(left) > 3:
+        ears = ((left[k - 1], left[k], left[(k + 1) % len(left)]) for k in range(len(left)))
+        # A polygon that crosses itself may have no ear; then any corner will do.
+        ear = next((ear for ear in ears if _is_ear(corners, ear, left, normal)), (left[0], left[1], left[2]))
+        triangles.append(ear)
+        left.remove(ear[1])
+    return np.array([*triangles, left], dtype=np.int64)
+
+
+def _is_ear(corners: Array, ear: tuple[int, int, int], left: Iterable[int], normal: Array) -> bool:
+    a, b, c = corners[list(ear)]
+    if np.cross(b - a, c - b) @ normal <= 0.0:
+        return False
+    others = corners[[place for place in left if place not in ear]]
+    inside = [np.cross(end - start, others - start) @ normal >= 0.0 for start, end in ((a, b), (b, c), (c, a))]
+    return not bool(np.any(inside[0] & inside[1] & inside[2]))

@@ -1,0 +1,112 @@
+"""Unit shapes as surfaces of triangles, and normals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+
+from osimlite.io.meshes.surface import Array, Indices, Surface
+
+SLICES, STACKS = 48, 24
+
+
+@cache
+def ball(slices: int = SLICES, stacks: int = STACKS) -> Surface:
+    """A ball of radius 1 about the origin."""
+    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, stacks + 1)
+    arc = np.column_stack((np.cos(angles), np.sin(angles)))
+    return _turned([np.hstack((arc, arc))], slices)
+
+
+@cache
+def tube(slices: int = SLICES) -> Surface:
+    """A closed cylinder of radius 1 and length 1 along Z about the origin."""
+    caps = _strip((0, -0.5), (1, -0.5), (0, -1)), _strip((1, 0.5), (0, 0.5), (0, 1))
+    return _turned([caps[0], _strip((1, -0.5), (1, 0.5), (1, 0)), caps[1]], slices)
+
+
+@cache
+def spike() -> Surface:
+    """A closed cone of base radius 1 around the origin, and its tip at Z = 1."""
+    return _turned([_strip((0, 0), (1, 0), (0, -1)), _strip((1, 0), (0, 1), (0.5**0.5, 0.5**0.5))])
+
+
+@cache
+def ring(thickness: float) -> Surface:
+    """A torus about Z whose middle line has radius 1, of a tube of radius `thickness`."""
+    angles = np.linspace(0.0, 2.0 * np.pi, STACKS + 1)
+    arc = np.column_stack((np.cos(angles), np.sin(angles)))
+    return _turned([np.hstack((thickness * arc + (1.0, 0.0), arc))])
+
+
+@cache
+def cube() -> Surface:
+    """A box with edges of length 1 about the origin."""
+    points: list[Array] = []
+    normals: list[Array] = []
+    triangles: list[Indices] = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            side = np.zeros((4, 3))
+            side[:, axis] = 0.5 * sign
+            side[:, axis - 2] = (-0.5, 0.5, 0.5, -0.5)
+            side[:, axis - 1] = (-0.5, -0.5, 0.5, 0.5)
+            first = 4 * len(points)
+            points.append(side)
+            normals.append(np.tile(sign * np.eye(3)[axis], (4, 1)))
+            corners = np.array(((0, 1, 2), (0, 2, 3))) + first
+            triangles.append(corners if sign > 0.0 else corners[:, ::-1])
+    return Surface(np.concatenate(points), np.concatenate(triangles), np.concatenate(normals), is_closed=True)
+
+
+@cache
+def sheet() -> Surface:
+    """A square with edges of length 1 in the plane X = 0 about the origin; its outside is towards -X."""
+    points = np.array(((0, -0.5, -0.5), (0, 0.5, -0.5), (0, 0.5, 0.5), (0, -0.5, 0.5)))
+    return Surface(points, np.array(((0, 2, 1), (0, 3, 2))), np.tile((-1.0, 0.0, 0.0), (4, 1)))
+
+
+def _strip(start: tuple[float, float], end: tuple[float, float], normal: tuple[float, float]) -> Array:
+    return np.array(((*start, *normal), (*end, *normal)), dtype=float)
+
+
+def _turned(strips: Sequence[Array], slices: int = SLICES) -> Surface:
+    """The surface that lines in a half plane sweep when they turn about Z.
+
+    Args:
+        strips: lines (k, 4), each row distance from Z, height, and the outward normal in the same two directions. With
+            the distance to the right and the height up, the outside is to the right of the way along a line.
+        slices: how many there are around.
+    """
+    around = 2.0 * np.pi * np.arange(slices) / slices
+    points: list[Array] = []
+    normals: list[Array] = []
+    triangles: list[Indices] = []
+    first = 0
+    for strip in strips:
+        for vectors, columns in ((points, strip[:, :2]), (normals, strip[:, 2:])):
+            out, up = columns[:, :1], np.repeat(columns[:, 1:], slices, axis=1)
+            vectors.append(np.stack((out * np.cos(around), out * np.sin(around), up), axis=2).reshape(-1, 3))
+        row, k = np.divmod(np.arange((len(strip) - 1) * slices), slices)
+        a, b = first + row * slices + k, first + row * slices + (k + 1) % slices
+        # On the axis nothing is between two slices.
+        apart = np.abs(strip[:, 0]) > 1e-12
+        triangles.append(np.column_stack((a, b, b + slices))[apart[row]])
+        triangles.append(np.column_stack((a, b + slices, a + slices))[apart[row + 1]])
+        first += len(strip) * slices
+    return Surface(np.concatenate(points), np.concatenate(triangles), np.concatenate(normals), is_closed=True)
+
+
+def normals_of(surface: Surface) -> Array:
+    """Outward unit vectors at the points (n, 3): those that come with the surface, else the mean of the triangles'."""
+    if surface.normals is not None:
+        return surface.normals
+    a, b, c = (surface.points[surface.triangles[:, index]] for index in range(3))
+    areas = np.cross(b - a, c - a)
+    total = np.zeros_like(surface.points)
+    for index in range(3):
+        np.add.at(total, surface.triangles[:, index], areas)
+    lengths = np.linalg.norm(total, axis=1, keepdims=True)
+    return total / np.where(lengths > 0.0, lengths, 1.0)

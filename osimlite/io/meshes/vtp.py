@@ -1,0 +1,273 @@
+"""Reading surfaces in VTK's XML format (``.vtp``, PolyData), in every encoding that VTK writes.
+
+The format: https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html. Numbers stand as text, or as
+base64 in place, or after the tree, raw or as base64; either of the last three may be compressed in blocks. Vertices
+and lines have no surface and are passed over.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import lzma
+import re
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+from lxml import etree
+from numpy.typing import NDArray
+
+from osimlite.errors import OsimliteError
+from osimlite.io.meshes.surface import (
+    Array,
+    Indices,
+    Polygons,
+    Surface,
+    strip_triangles,
+    triangulated,
+)
+
+MAX_BYTES = 400_000_000
+"""Bytes of all numbers of a file, decompressed. A mesh of a million points has about 50 MB of them."""
+
+
+def _inflate(block: bytes, size: int) -> bytes:
+    """Decompress a block of zlib to at most `size` bytes; raise ValueError for more."""
+    stream = zlib.decompressobj()
+    data = stream.decompress(block, size + 1)
+    if len(data) > size or not stream.eof:
+        raise ValueError
+    return data
+
+
+def _expand(block: bytes, size: int) -> bytes:
+    """Decompress a block of LZMA to at most `size` bytes; raise ValueError for more."""
+    stream = lzma.LZMADecompressor(memlimit=MAX_BYTES)
+    data = stream.decompress(block, size + 1)
+    if len(data) > size or not stream.eof:
+        raise ValueError
+    return data
+
+
+_DECOMPRESS: dict[str, Callable[[bytes, int], bytes]] = {
+    "vtkZLibDataCompressor": _inflate,
+    "vtkLZMADataCompressor": _expand,
+}
+
+_TYPES = {
+    **{f"Int{bits}": f"i{bits // 8}" for bits in (8, 16, 32, 64)},
+    **{f"UInt{bits}": f"u{bits // 8}" for bits in (8, 16, 32, 64)},
+    "Float32": "f4",
+    "Float64": "f8",
+}
+
+
+class _Unreadable(Exception):
+    """What is wrong with a file, without its name."""
+
+
+def read_vtp(content: bytes, name: str) -> Surface:
+    """The surface in a ``.vtp`` file, its polygons cut into triangles.
+
+    Args:
+        content: of the file.
+        name: of the file, for messages.
+
+    Raises:
+        OsimliteError: it is not such a file, is damaged, or is compressed in a way that osimlite does not know.
+    """
+    with _named(name):
+        return _File(content).surface()
+
+
+def vtp_polygons(content: bytes, name: str) -> Polygons:
+    """The polygons in a ``.vtp`` file, with all digits of text that says it has single precision, as Simbody has them.
+
+    Arguments and errors as those of :func:`read_vtp`.
+    """
+    with _named(name):
+        return _File(content, all_digits=True).polygons()[0]
+
+
+@contextmanager
+def _named(name: str) -> Iterator[None]:
+    try:
+        # Nonsense in a damaged file is found by what it gives; numpy need not warn of it on the way.
+        with np.errstate(all="ignore"):
+            yield
+    except _Unreadable as problem:
+        raise OsimliteError(f"{problem}; save it again as PolyData (.vtp) or as .obj", file=name) from None
+
+
+class _File:
+    def __init__(self, content: bytes, *, all_digits: bool = False) -> None:
+        self.all_digits, self.left = all_digits, MAX_BYTES
+        # What is appended may be no XML at all, so it is cut out before the rest is read.
+        self.appended = b""
+        mark = content.find(b"<AppendedData")
+        if mark >= 0:
+            first, last = content.find(b"_", content.find(b">", mark)) + 1, content.rfind(b"</AppendedData")
+            if not 0 < first <= last:
+                raise _Unreadable("the file ends in the middle")
+            self.appended, content = content[first:last], content[:first] + content[last:]
+        try:
+            parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True)
+            self.root = etree.fromstring(content, parser)
+        except etree.XMLSyntaxError as error:
+            # The parser breaks some of its messages into lines.
+            why = " ".join(str(error.msg).split()).replace(" ,", ",")
+            raise _Unreadable(f"it is not a VTK file in XML ({why})") from None
+        if self.root.getroottree().docinfo.internalDTD is not None:
+            raise _Unreadable("it has a DOCTYPE, which may declare what is not in the file")
+        if self.root.tag != "VTKFile" or self.root.get("type") != "PolyData":
+            raise _Unreadable("it is not a VTK file with a surface (type PolyData)")
+        section = self.root.find("AppendedData")
+        self.raw = section is not None and section.get("encoding") == "raw"
+        self.order = ">" if self.root.get("byte_order") == "BigEndian" else "<"
+        self.header = np.dtype(self.order + _TYPES.get(self.root.get("header_type", "UInt32"), "u4"))
+        self.compressor = self.root.get("compressor", "")
+        try:
+            offsets = {int(array.get("offset", "0")) for array in self.root.iter("DataArray")}
+        except ValueError:
+            raise _Unreadable("one of its offsets is no number") from None
+        self.offsets = [*sorted(offsets), len(self.appended)]
+
+    def surface(self) -> Surface:
+        polygons, normals = self.polygons()
+        return Surface(polygons.points, triangulated(*polygons), normals)
+
+    def polygons(self) -> tuple[Polygons, Array | None]:
+        """All polygons, those of strips among them, and the normals at the points if there are any."""
+        points, corners, normals = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int64)], [np.zeros((0, 3))]
+        sizes, count, all_normals = [np.zeros(0, dtype=np.int64)], 0, True
+        for piece in self.root.iterfind("PolyData/Piece"):
+            own = self._vectors(piece.find("Points/DataArray"))
+            points.append(own)
+            for around, lengths in self._polygons(piece, len(own)):
+                corners.append(around + count)
+                sizes.append(lengths)
+            at_points = self._normals(piece, len(own))
+            all_normals = all_normals and at_points is not None
+            normals += [] if at_points is None else [at_points]
+            count += len(own)
+        ends = np.concatenate(sizes).cumsum()
+        if not len(ends):
+            raise _Unreadable("it has no polygons")
+        result = Polygons(np.concatenate(points), np.concatenate(corners), ends)
+        return result, np.concatenate(normals) if all_normals else None
+
+    def _polygons(self, piece: etree._Element, count: int) -> Iterator[tuple[Indices, Indices]]:
+        """Corners, one after the other, and numbers of corners: of polygons, then of the triangles of every strip."""
+        corners, ends = self._cells(piece, "Polys", count)
+        yield corners, np.diff(ends, prepend=0)
+        corners, ends = self._cells(piece, "Strips", count)
+        for strip in np.split(corners, ends[:-1]) if len(ends) else []:
+            if len(strip) >= 3:
+                triangles = strip_triangles(strip)
+                yield triangles.ravel(), np.full(len(triangles), 3)
+
+    def _cells(self, piece: etree._Element, tag: str, count: int) -> tuple[Indices, Indices]:
+        """Corners of all cells of a kind, one after the other, and where each cell ends."""
+        corners, ends = (
+            np.zeros(0, dtype=np.int64) if array is None else self._numbers(array).astype(np.int64)
+            for array in (piece.find(f"{tag}/DataArray[@Name='{name}']") for name in ("connectivity", "offsets"))
+        )
+        if not len(ends):
+            return corners[:0], ends
+        if ends[0] < 0 or np.any(np.diff(ends) < 0) or ends[-1] > len(corners):
+            raise _Unreadable(f"the offsets of its {tag} do not fit their connectivity")
+        corners = corners[: ends[-1]]
+        if len(corners) and not 0 <= corners.min() <= corners.max() < count:
+            raise _Unreadable(f"its {tag} name points that are not there")
+        return corners, ends
+
+    def _normals(self, piece: etree._Element, count: int) -> Array | None:
+        data = piece.find("PointData")
+        if data is None:
+            return None
+        wanted = data.get("Normals", "Normals")
+        array = next((item for item in data.iterfind("DataArray") if item.get("Name") == wanted), None)
+        if array is None or array.get("NumberOfComponents") != "3":
+            return None
+        normals = self._vectors(array)
+        return normals if len(normals) == count else None
+
+    def _vectors(self, array: etree._Element | None) -> Array:
+        if array is None:
+            raise _Unreadable("it has a piece without points")
+        numbers = self._numbers(array).astype(np.float64)
+        if len(numbers) % 3 or not np.isfinite(numbers).all():
+            raise _Unreadable(f"its {array.get('Name', 'points')} are not three finite numbers each")
+        return numbers.reshape(-1, 3)
+
+    def _numbers(self, array: etree._Element) -> NDArray[np.generic]:
+        """The numbers of a DataArray."""
+        kind, form = array.get("type", ""), array.get("format", "ascii")
+        if kind not in _TYPES:
+            raise _Unreadable(f"it has numbers of the type '{kind}'")
+        dtype = np.dtype(self.order + _TYPES[kind])
+        try:
+            match form:
+                case "ascii":
+                    exact = self.all_digits and dtype.kind == "f"
+                    return np.array((array.text or "").split(), dtype=np.float64 if exact else dtype)
+                case "binary":
+                    data = self._payload(_base64((array.text or "").encode()))
+                case "appended":
+                    data = self._payload(self._after(int(array.get("offset", "0"))))
+                case _:
+                    raise _Unreadable(f"it has numbers in the format '{form}'")
+            return np.frombuffer(data, dtype)
+        except MemoryError:
+            raise _Unreadable(f"its numbers named '{array.get('Name', '')}' need more memory than there is") from None
+        except (ValueError, IndexError, OverflowError, binascii.Error, zlib.error, lzma.LZMAError):
+            raise _Unreadable(f"its numbers named '{array.get('Name', '')}' are damaged or cut off") from None
+
+    def _after(self, offset: int) -> bytes:
+        """The bytes of the array that starts at an offset of what is appended."""
+        if not 0 <= offset < len(self.appended):
+            raise ValueError
+        end = next(place for place in self.offsets if place > offset)
+        part = self.appended[offset:end]
+        return part if self.raw else _base64(part)
+
+    def _take(self, count: int) -> None:
+        """Count bytes of numbers; several arrays may be made of the same bytes of the file."""
+        self.left -= count
+        if self.left < 0:
+            raise _Unreadable(f"it has more than {MAX_BYTES / 1e6:g} MB of numbers")
+
+    def _payload(self, stream: bytes) -> bytes:
+        """What a block of bytes holds after its header, decompressed."""
+        width = self.header.itemsize
+        if not self.compressor:
+            size = int(np.frombuffer(stream, self.header, 1)[0])
+            self._take(min(size, len(stream)))
+            data = stream[width : width + size]
+            if len(data) != size:
+                raise ValueError
+            return data
+        if self.compressor not in _DECOMPRESS:
+            raise _Unreadable(f"it is compressed by {self.compressor}, which osimlite does not read")
+        blocks = int(np.frombuffer(stream, self.header, 1)[0])
+        if not blocks:
+            return b""
+        _, whole, last, *sizes = np.frombuffer(stream, self.header, 3 + blocks).tolist()
+        # The size that is promised decides before anything is decompressed; no block may be longer.
+        self._take(whole * (blocks - bool(last)) + last)
+        place, parts = (3 + blocks) * width, []
+        for size in sizes:
+            parts.append(_DECOMPRESS[self.compressor](stream[place : place + size], max(whole, last)))
+            place += size
+        # A last block that is as long as the others is written as having length zero.
+        if sum(map(len, parts)) != whole * (blocks - bool(last)) + last:
+            raise ValueError
+        return b"".join(parts)
+
+
+def _base64(text: bytes) -> bytes:
+    """The bytes of base64 text, in which header and data may each be encoded, and padded, on their own."""
+    parts = re.findall(rb"[^=]+=*", b"".join(text.split()))
+    return b"".join(base64.b64decode(part, validate=True) for part in parts)

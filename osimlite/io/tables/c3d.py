@@ -1,0 +1,119 @@
+"""Files of motion capture (.c3d), read by ezc3d as OpenSim reads them: markers, and the forces of the force plates.
+
+Everything is in the axes of the file, which often are not those of a model, whose y axis points upwards.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from osimlite.base.files import read_file
+from osimlite.base.require import SAFE_PATH
+from osimlite.errors import DocumentError, MissingDependency
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.multibody.spatial import Array
+
+if TYPE_CHECKING:
+    import subprocess
+
+ENDING = ".c3d"
+
+SECONDS = 2
+"""Processor time of reading a small file, with loading numpy; large ones get more by their size."""
+
+BYTES_PER_SECOND = 2_000_000
+"""Of a file, at least so much is read in a second; it is about 50 times as much where nothing is wrong."""
+
+PATIENCE = 30
+"""The process may wait so many times its processor time for a processor."""
+
+PROGRAM = "import sys; sys.path[:0] = sys.argv[3:]; from osimlite.io.tables.c3d_process import serve; serve()"
+
+
+def read_c3d_markers(path: str | Path) -> tuple[tuple[str, ...], Array, Array]:
+    """Names of the markers (m,), times (t,), s, and places (t, m, 3), m; NaN where a marker was not seen.
+
+    Raises:
+        MissingFileError: there is no such file.
+        DocumentError: it is no .c3d file.
+        MissingDependency: ezc3d is not installed.
+    """
+    arrays = _read_apart(path, "markers")
+    return tuple(arrays["names"].tolist()), arrays["times"], arrays["positions"]
+
+
+def read_c3d_forces(path: str | Path) -> StoTable:
+    """The forces of the plates over time, as OpenSim's reader names them.
+
+    Of the first plate ``f1_x``, ``f1_y``, ``f1_z`` is the force (N), ``p1_x`` ... the middle of the plate (m), and
+    ``m1_x`` ... the moment about it (N·m).
+
+    Raises:
+        MissingFileError: there is no such file.
+        DocumentError: it is no .c3d file, or it has no force plates.
+        MissingDependency: ezc3d is not installed.
+    """
+    arrays = _read_apart(path, "forces")
+    if not len(arrays["names"]):
+        raise DocumentError("the file has no force plates", file=str(path))
+    return StoTable("forces", arrays["times"], tuple(arrays["names"].tolist()), arrays["rows"], file=str(path))
+
+
+def _read_apart(path: str | Path, what: str) -> dict[str, Array]:
+    """Return the arrays that a process of its own reads from a file.
+
+    Damaged files make ezc3d 1.6 write beyond its memory (a process ends by SIGSEGV), or loop without
+    end: it may do so where nothing else is lost, and for a limited time.
+
+    Args:
+        path: of the file.
+        what: ``markers`` or ``forces``.
+    """
+    size = len(read_file(path))
+    # A name in sys.modules that is None, or a package that is not there.
+    if sys.modules.get("ezc3d", ...) is None or find_spec("ezc3d") is None:
+        raise MissingDependency(
+            "a .c3d file is read by ezc3d, which is not installed; run: pip install ezc3d, or pip install "
+            "'osimlite[c3d]'",
+            file=str(path),
+        )
+    seconds = SECONDS + size // BYTES_PER_SECOND
+    # Imported here, since every tool knows of these files and few have one.
+    import subprocess
+
+    package = str(Path(__file__).parents[3])
+    command = [sys.executable, "-P", "-c", PROGRAM, what, os.path.abspath(path), str(seconds), package]
+    try:
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=PATIENCE * seconds,
+            check=False,
+            cwd=Path(__file__).parent,
+            env={**os.environ, SAFE_PATH: "1", "OPENBLAS_NUM_THREADS": "1"},
+        )
+    except subprocess.TimeoutExpired:
+        raise DocumentError("the file cannot be read: reading it does not end", file=str(path)) from None
+    except OSError as error:
+        raise DocumentError(f"no process can be started that reads it: {error}", file=str(path)) from None
+    if done.returncode != 0:
+        raise DocumentError(f"the file cannot be read: {_reason(done)}", file=str(path))
+    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:
+        return dict(arrays)
+
+
+def _reason(done: subprocess.CompletedProcess[bytes]) -> str:
+    """Return why a process has read nothing, by what it has left."""
+    try:
+        return str(json.loads(done.stdout)["error"])
+    except (ValueError, KeyError, TypeError):
+        return "it is damaged, so that reading it ends in a crash or takes too long"

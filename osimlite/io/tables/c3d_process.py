@@ -1,0 +1,100 @@
+"""The process that reads a .c3d file: what it finds goes to its standard output as arrays of numpy."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from osimlite.io.tables.headers import METRES
+from osimlite.mechanics.multibody.spatial import Array
+
+MOMENTS = {"nm": 1.0, "n.m": 1.0, "nmm": 0.001, "n.mm": 0.001}
+"""Units of moments in N·m."""
+
+MAX_BYTES = 4_000_000_000
+"""Memory of the process; a file of the largest size that is read takes about a third of it."""
+
+
+def serve() -> None:
+    """Read the file that the command names, and write its markers or its forces to the standard output.
+
+    Of a file that cannot be read the reason is written as JSON, and the exit code is 1.
+    """
+    what, path, seconds = sys.argv[1:4]
+    _limit(int(seconds))
+    try:
+        arrays = READERS[what](path)
+        if not all(np.isfinite(arrays["times"])):
+            raise ValueError("its frames have no times")
+        buffer = io.BytesIO()
+        np.savez(buffer, allow_pickle=False, **arrays)
+    # ezc3d raises whatever its standard library does, and a damaged header leads to any key or index.
+    except Exception as error:
+        reason = str(error) or type(error).__name__
+        known = isinstance(error, OSError | RuntimeError | ValueError)
+        message = reason if known else f"it is damaged ({reason})"
+        sys.stdout.buffer.write(json.dumps({"error": message}).encode())
+        raise SystemExit(1) from None
+    sys.stdout.buffer.write(buffer.getvalue())
+
+
+def read_markers(path: str) -> dict[str, Array]:
+    """Return names (m,), times (t,) in s and positions (t, m, 3) in m; NaN where a marker was not seen."""
+    result = import_module("ezc3d").c3d(path)
+    points = result["parameters"]["POINT"]
+    unit = METRES.get(points["UNITS"]["value"][0].strip().lower(), 0.001)
+    names = [name for key, more in points.items() if key.startswith("LABELS") for name in more["value"]]
+    positions = np.moveaxis(result["data"]["points"][:3], (2, 1, 0), (0, 1, 2))
+    times = _start(result) + np.arange(len(positions)) / result["header"]["points"]["frame_rate"]
+    names = names[: positions.shape[1]]
+    if len(names) != positions.shape[1]:
+        raise ValueError(f"it names {len(names)} of {positions.shape[1]} markers")
+    return {"names": np.array(names, dtype=np.str_), "times": times, "positions": unit * positions}
+
+
+def read_forces(path: str) -> dict[str, Array]:
+    """Return names (k,), times (t,) in s and rows (t, k) in N, m and N·m; without plates there is no name."""
+    result = import_module("ezc3d").c3d(path, extract_forceplat_data=True)
+    columns, rows = list[str](), list[Array]()
+    for number, plate in enumerate(result["data"]["platform"], start=1):
+        length = METRES.get(plate["unit_position"].strip().lower(), 0.001)
+        middle = np.repeat(length * plate["corners"].mean(axis=1)[:, None], plate["force"].shape[1], axis=1)
+        moment = MOMENTS.get(plate["unit_moment"].strip().lower(), 0.001) * plate["moment"]
+        for letter, values in (("f", plate["force"]), ("p", middle), ("m", moment)):
+            columns += [f"{letter}{number}_{axis}" for axis in "xyz"]
+            rows += list(values)
+    if not rows:
+        return {"names": np.array([], dtype=np.str_), "times": np.zeros(0), "rows": np.zeros((0, 0))}
+    times = _start(result) + np.arange(len(rows[0])) / result["header"]["analogs"]["frame_rate"]
+    return {"names": np.array(columns, dtype=np.str_), "times": times, "rows": np.stack(rows, axis=1)}
+
+
+READERS: dict[str, Callable[[str], dict[str, Array]]] = {"markers": read_markers, "forces": read_forces}
+
+
+def _start(result: Any) -> float:
+    """Return the time of the first frame, s."""
+    points = result["header"]["points"]
+    return float(points["first_frame"] / points["frame_rate"])
+
+
+def _limit(seconds: int) -> None:
+    """Let the system end this process when it takes too much time or memory; Windows cannot."""
+    try:
+        import resource
+    except ImportError:
+        return
+    for kind, limit in (
+        (resource.RLIMIT_CPU, seconds),
+        (resource.RLIMIT_AS, MAX_BYTES),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        _, hard = resource.getrlimit(kind)
+        most = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+        resource.setrlimit(kind, (most, hard))

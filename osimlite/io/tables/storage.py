@@ -1,0 +1,220 @@
+"""OpenSim's storage files (.sto, .mot): tables over time."""
+
+from __future__ import annotations
+
+from array import array
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from osimlite.base.files import written_atomically
+from osimlite.base.records import dataclass, field
+from osimlite.errors import OsimliteError, SimulationError
+from osimlite.io.tables.headers import suffixes
+from osimlite.io.tables.table_stream import TableStream
+from osimlite.io.tables.tabular import Tabular
+from osimlite.mechanics.multibody.spatial import Array
+
+
+@dataclass(frozen=True, eq=False)
+class StoTable(Tabular):
+    """A table over time.
+
+    Attributes:
+        name: first line of the file.
+        times: (n,), s.
+        columns: labels of the m columns besides the time, in order; OpenSim itself writes some labels twice.
+        rows: (n, m).
+        in_degrees: whether rotational values are in degrees.
+        header: the first word of every line of the header, with the rest of the line.
+        kind: what the file holds; where it is not ``double``, a value has several columns.
+        file: where it was read from.
+    """
+
+    name: str
+    times: Array
+    columns: tuple[str, ...]
+    rows: Array
+    in_degrees: bool = False
+    header: dict[str, str] = field(default_factory=dict)
+    kind: str = "double"
+    file: str | None = None
+
+    def __getitem__(self, column: str) -> Array:
+        """The first column (n,) of a label; KeyError if there is none."""
+        if column not in self.columns:
+            raise KeyError(column)
+        return self.rows[:, self.columns.index(column)]
+
+    @property
+    def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
+        """The columns over ``time`` (s); of a label that is there again the second is called ``label.1``."""
+        columns, again = dict[str, Array](), Counter[str]()
+        for label, column in zip(self.columns, self.rows.T, strict=True):
+            columns[f"{label}.{again[label]}" if again[label] else label] = column
+            again[label] += 1
+        return {"time": self.times}, columns
+
+
+def sto_text(
+    name: str,
+    times: Iterable[float],
+    columns: Sequence[str],
+    rows: Iterable[Iterable[float]],
+    *,
+    in_degrees: bool = False,
+    header: Mapping[str, str] = MappingProxyType({}),
+) -> str:
+    """Write a table as OpenSim 4.6 does, but with all digits of every number, and more in its header."""
+    lines = list(_lines(times, rows, 1))
+    first, *others = _header(name, columns, len(lines), in_degrees, "double")
+    return "".join([first, *(f"{key}={value}\n" for key, value in header.items()), *others, *lines])
+
+
+def write_sto(
+    path: str | Path,
+    name: str,
+    times: Iterable[float],
+    columns: Sequence[str],
+    rows: Iterable[Iterable[float]],
+    *,
+    in_degrees: bool = False,
+    kind: str = "double",
+    has_missing: bool = False,
+) -> None:
+    """Write a table to a file, whole or not at all; the rows are taken one by one.
+
+    Args:
+        path: of the file.
+        name: first line of the file.
+        times: s.
+        columns: labels; for another kind than ``double`` one for each value.
+        rows: numbers, of one value after the other.
+        in_degrees: whether rotational values are in degrees.
+        kind: of the values: ``Vec3``, ``Quaternion`` and whatever else OpenSim knows.
+        has_missing: whether NaN stands for what was not measured, such as a marker that was not seen.
+
+    Raises:
+        SimulationError: a number is NaN or infinite.
+        OsimliteError: the file cannot be written.
+        UnsupportedError: OpenSim does not know the kind.
+    """
+    # Imported here, since many read tables and write none.
+    import shutil
+    import tempfile
+
+    # How many rows there are stands before them.
+    with tempfile.TemporaryFile("w+b") as body:
+        count = 0
+        for line in _lines(times, rows, len(suffixes(kind)), () if has_missing else columns):
+            body.write(line.encode())
+            count += 1
+        body.seek(0)
+        with written_atomically(path) as stream:
+            stream.write("".join(_header(name, columns, count, in_degrees, kind)).encode())
+            shutil.copyfileobj(body, stream)
+
+
+def read_sto(path: str | Path) -> StoTable:
+    """Read a table, as OpenSim 4 or an older version wrote it; errors as those of :class:`TableStream`."""
+    times, rows = array("d"), array("d")
+    with TableStream(path) as stream:
+        for time, row in stream:
+            times.append(time)
+            rows.extend(row)
+        return StoTable(
+            stream.name,
+            np.frombuffer(times) if times else np.zeros(0),
+            stream.columns,
+            np.frombuffer(rows).reshape(-1, len(stream.columns))
+            if rows
+            else np.zeros((len(times), len(stream.columns))),
+            stream.in_degrees,
+            stream.header,
+            stream.kind,
+            str(path),
+        )
+
+
+def beside(folder: Path, name: str) -> Path:
+    """Where a file is that a document names: looked for in the document's folder, then from where the program runs."""
+    there, here = folder / name, Path(name)
+    return there if there.is_file() or not here.is_file() else here
+
+
+def expect_plain_labels(name: str, columns: Sequence[str]) -> None:
+    """Refuse names that a table cannot hold: a tab ends a label, and a line end the header.
+
+    Raises:
+        OsimliteError: a name has a tab or a line end.
+    """
+    for label in (name, *columns):
+        # Readers of text end lines at more characters than at line feeds.
+        if "\t" in label or len(f"{label}.".splitlines()) > 1:
+            raise OsimliteError(
+                f"a table cannot have the name {label!r}, which holds a tab or a line end; rename it in the model"
+            )
+
+
+def expect_numbers(name: str, columns: Sequence[str], times: Array, rows: Array) -> None:
+    """Refuse a result that is no number: this is the guard of all tables that are no input.
+
+    Raises:
+        SimulationError: a value is NaN or infinite; with its column and time.
+    """
+    odd = np.argwhere(~np.isfinite(rows))
+    if len(odd):
+        row, column = odd[0]
+        raise SimulationError(
+            f"'{columns[column]}' of the {name or 'results'} is {rows[row, column]:g} at {times[row]:g} s; look for a "
+            "number in the model or the data that is far too large"
+        )
+
+
+def _header(name: str, columns: Sequence[str], rows: int, in_degrees: bool, kind: str) -> Iterator[str]:
+    expect_plain_labels(name, columns)
+    yield f"{name}\n"
+    yield f"inDegrees={'yes' if in_degrees else 'no'}\n"
+    yield f"nColumns={len(columns) + 1}\n"
+    yield f"nRows={rows}\n"
+    yield f"DataType={kind}\n"
+    yield "version=3\nendheader\n"
+    yield "\t".join(("time", *columns)) + "\n"
+
+
+def _lines(
+    times: Iterable[float], rows: Iterable[Iterable[float]], size: int, columns: Sequence[str] = ()
+) -> Iterator[str]:
+    """Yield lines of numbers, `size` per value; numbers of named columns must be finite."""
+    for time, row in zip(times, rows, strict=True):
+        if columns and not np.isfinite(values := np.array([*row], dtype=float)).all():
+            labels = columns if size == 1 else [column for column in columns for _ in range(size)]
+            expect_numbers("results", labels, np.array([time]), values[None])
+        words = [word[:-2] if word.endswith(".0") else word for word in map(repr, map(float, row))]
+        if size > 1:
+            if len(words) % size:
+                raise OsimliteError(f"a row has {len(words)} numbers, which makes no whole values of {size} each")
+            words = [",".join(words[start : start + size]) for start in range(0, len(words), size)]
+        yield "\t".join((number_text(time), *words)) + "\n"
+
+
+def adapter_lines(table: StoTable) -> Iterator[str]:
+    """The lines of a table as OpenSim's ``STOFileAdapter`` writes it, without the version of OpenSim."""
+    expect_plain_labels("", (*table.columns, *table.header, *map(str, table.header.values())))
+    yield "".join(f"{key}={value}\n" for key, value in table.header.items())
+    yield f"DataType={table.kind}\nversion=3\nendheader\n"
+    ends = suffixes(table.kind)
+    labels = [column.removesuffix(ends[0]) for column in table.columns[:: len(ends)]]
+    yield "\t".join(("time", *labels)) + "\n"
+    line = "\t".join(["%.16g", *[",".join(["%.16g"] * len(ends))] * len(labels)]) + "\n"
+    for row in np.column_stack([table.times, table.rows]).tolist():
+        yield line % tuple(row)
+
+
+def number_text(value: float) -> str:
+    """All digits of a number, without a needless point."""
+    text = repr(float(value))
+    return text[:-2] if text.endswith(".0") else text

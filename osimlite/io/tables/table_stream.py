@@ -1,0 +1,151 @@
+"""Storage files (.sto, .mot) row by row: the header at once, the rows as they are asked for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from osimlite.base.files import open_file
+from osimlite.base.text import counted
+from osimlite.errors import DocumentError
+from osimlite.io.tables.headers import LONGEST_HEADER, StorageHeader, suffixes
+
+_NO_NUMBER = re.compile(r"[-+]?1\.#(IND|QNAN|SNAN|INF)\d*", re.IGNORECASE)
+"""How programs on Windows wrote what is no number."""
+
+
+class TableStream:
+    """A storage file of which one row at a time is read; close it after use, or use it in a ``with`` statement.
+
+    Iterating gives ``(time, row)`` with the time in s and the numbers of the columns in their order; blank lines are
+    passed over.
+
+    Attributes:
+        file: its path.
+        name: first line of the file.
+        kind: what it holds, ``double`` as a rule.
+        labels: of the columns as they are in the file, without the time.
+        columns: labels of the numbers; of a Vec3 ``p`` these are ``p_x``, ``p_y`` and ``p_z``.
+        in_degrees: whether rotational values are in degrees.
+        line: number of the line of the file that was read last.
+        text: of the row that was read last.
+        header: the first word of every line of the header, with the rest of the line.
+
+    Raises:
+        MissingFileError: there is no such file, or it may not be read.
+        DocumentError: it is not a storage file, or a row is damaged; with line and column.
+        UnsupportedError: it holds a kind that OpenSim does not know.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.file, self.line, self.text = str(path), 0, ""
+        self._stream = open_file(path)
+        try:
+            self._read_header()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close the file."""
+        self._stream.close()
+
+    def __enter__(self) -> TableStream:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __iter__(self) -> Iterator[tuple[float, list[float]]]:
+        place, size = self._time, len(self.columns) + 1
+        vectors = self.kind != "double"
+        for number, data in enumerate(self._stream, start=self.line + 1):
+            line = data.decode("utf-8", "replace")
+            self.line, self.text = number, line
+            text = line.replace(",", " ") if vectors else line
+            try:
+                row = list(map(float, text.split()))
+            except ValueError:
+                row = self._odd(text, number)
+            if not row:
+                continue
+            if len(row) != size:
+                raise DocumentError(
+                    f"the row has {counted(len(row), 'number')} and needs {size}",
+                    file=self.file,
+                    line=number,
+                    column=len(line.rstrip()) + 1 if len(row) < size else start_of_word(text, size),
+                )
+            time = row.pop(place)
+            yield time, row
+
+    def _odd(self, text: str, number: int) -> list[float]:
+        """A row that has something else than plain numbers."""
+        row = []
+        for match in re.finditer(r"\S+", text):
+            word = match.group()
+            odd = _NO_NUMBER.fullmatch(word)
+            if odd:
+                word = word[0].replace("1", "") + "inf" if odd.group(1).upper() == "INF" else "nan"
+            try:
+                row.append(float(word))
+            except ValueError:
+                raise DocumentError(
+                    f"'{word}' is no number", file=self.file, line=number, column=match.start() + 1
+                ) from None
+        return row
+
+    def _read_header(self) -> None:
+        beginning = b"".join(self._stream.readlines(LONGEST_HEADER))
+        result = StorageHeader(beginning, self.file)
+        if not result.end.text:
+            raise DocumentError(_no_storage(beginning[:100].lstrip()), file=self.file)
+        self._stream.seek(result.rows)
+        self.line, self.name, self.in_degrees = result.label_line, result.name, result.in_degrees
+        self.header = {entry.key.text: entry.value.text for entry in result.entries.values()}
+        ends = suffixes(result.kind, self.file)
+        self.kind = "double" if ends == ("",) else result.kind
+        if not result.labels:
+            raise DocumentError("the table ends before its column labels", file=self.file, line=result.end.at.line)
+        labels = [label.text for label in result.labels]
+        at = next((index for index, label in enumerate(labels) if label.lower() == "time"), None)
+        if at is None or (at > 0 and self.kind != "double"):
+            raise DocumentError(
+                f"the first column is '{labels[0]}'; it must be 'time'",
+                file=self.file,
+                line=self.line,
+                column=result.labels[0].at.column,
+            )
+        self._time = at
+        self.labels = (*labels[:at], *labels[at + 1 :])
+        self.columns = tuple(label + end for label in self.labels for end in ends)
+
+
+def _no_storage(beginning: bytes) -> str:
+    """Why a file without a line 'endheader' cannot be taken, by what it begins with."""
+    if beginning.startswith(b"PathFileType"):
+        return (
+            "these are markers over time (.trc); a storage file is needed here (.sto, .mot): inverse kinematics makes "
+            "coordinates of markers"
+        )
+    if beginning.startswith(b"<"):
+        return "this is XML, and no storage file (.sto, .mot); are the arguments in the right order?"
+    return "this is no storage file (.sto, .mot): it has no line 'endheader'"
+
+
+def start_of_word(text: str, word: int) -> int:
+    """Column (from 1) at which a word (from 0) of a line starts."""
+    return [match.start() for match in re.finditer(r"\S+", text)][word] + 1
+
+
+def stream_table(path: str | Path) -> TableStream:
+    """Open a storage file to read it row by row, however large it is; errors as those of :class:`TableStream`.
+
+    Example::
+
+        with stream_table("grf.mot") as table:
+            for time, row in table:
+                ...
+    """
+    return TableStream(path)

@@ -1,0 +1,5 @@
+"""Paths and muscles measured over the ranges of the coordinates, for the rules of the linter that are about that."""
+
+from osimlite.lint.measuring.model import measured
+
+__all__ = ["measured"]

@@ -1,0 +1,288 @@
+"""Builds a model as a simulation does, and reports what stops it: for rules of the linter.
+
+The steps are those of `osimlite simulate`: the mechanism, its forces and controllers, the default
+pose that fulfils the constraints, one evaluation of the accelerations.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite.errors import DoubtfulWarning, OsimliteError, SimulationError, UnsupportedError
+from osimlite.lint.construction import Obstacle, Stage
+from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.assembly import UnmetConstraintsError, find_unclamped
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.model import Model
+from osimlite.schema.scholz_paths import Scholz2015GeometryPath
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.geometries.paths.scholz2015_geometry_path import (
+    check as check_cable,
+)
+from osimlite.simulation.elements.items import ForceElement
+from osimlite.simulation.elements.probe import probe_elements
+from osimlite.simulation.engines.linking import AT_HAND
+from osimlite.simulation.system import System
+
+SINGULAR = 1e-12
+"""Ratio of the least to the largest eigenvalue below which a mass matrix counts as singular."""
+
+_QUOTED_PATH = re.compile(r"'(/[^']*)'")
+
+
+@np.errstate(all="ignore")
+def try_construction(model: Model, folder: Path | None = None) -> tuple[list[Obstacle], Mechanism | None]:
+    """Return what stops the computation of a model.
+
+    Args:
+        model: the model to build.
+        folder: where its file is, and the files that it names; None for a model that is in no file.
+
+    Returns:
+        The obstacles in the order of the steps, and the mechanism for those who compute more of the model; None if it
+        has none.
+    """
+    with warnings.catch_warnings():
+        # Rules report what a simulation only warns of.
+        warnings.simplefilter("ignore", DoubtfulWarning)
+        construction = _Construction(model, folder)
+        return [*construction.run()], construction.mechanism
+
+
+class _Construction:
+    """One attempt to compute the accelerations of a model."""
+
+    def __init__(self, model: Model, folder: Path | None) -> None:
+        self.model = model
+        self.folder = Path(folder or ".")
+        self.tree = model.tree()
+        self.mechanism: Mechanism | None = None
+
+    def run(self) -> Iterator[Obstacle]:
+        try:
+            self.mechanism = mechanism = build_mechanism(self.model)
+        except OsimliteError as error:
+            yield self.describe(error, Stage.MECHANISM)
+            return
+        builder = ElementBuilder(self.model, mechanism, self.folder)
+        elements: list[ForceElement] = []
+        failures = [*self.gather(builder, elements)]
+        yield from failures
+        is_complete = all(failure.stage == Stage.UNSUPPORTED for failure in failures)
+        try:
+            q = mechanism.assemble({})
+        except OsimliteError as error:
+            yield from self.describe_assembly(error)
+            return
+        yield from self.find_clamps(mechanism, q)
+        if not is_complete:
+            elements = []
+        controls = builder.controls.controls if is_complete else Forces(()).controls
+        yield from self.evaluate(mechanism, q, Forces(tuple(elements), controls=controls))
+
+    # ------------------------------------------------------------------------------------- forces
+    def gather(self, builder: ElementBuilder, elements: list[ForceElement]) -> Iterator[Obstacle]:
+        """Make the elements of all forces and probes; yield the reasons why some have none."""
+        try:
+            # What a controller cannot do is an error of each actuator that it drives.
+            builder.controls  # noqa: B018
+        except OsimliteError as error:
+            yield self.describe(error, Stage.FORCE)
+            return
+        for force in builder.forces():
+            if isinstance(getattr(force, "geometry_path", None), Scholz2015GeometryPath):
+                # Its way is searched once; in every evaluation it takes seconds without machine code.
+                try:
+                    check_cable(builder, force)
+                except OsimliteError as error:
+                    yield self.describe(error, Stage.CABLE, builder.path(force))
+                continue
+            try:
+                elements.append(builder.element(force))
+            except OsimliteError as error:
+                yield self.describe(error, Stage.FORCE, builder.path(force))
+        try:
+            probe_elements(builder, elements)
+        except OsimliteError as error:
+            yield self.describe(error, Stage.FORCE)
+
+    # ------------------------------------------------------------------------------- default pose
+    def describe_assembly(self, error: OsimliteError) -> Iterator[Obstacle]:
+        """Yield an obstacle for each constraint that the default pose does not meet."""
+        if not isinstance(error, UnmetConstraintsError):
+            is_pose = isinstance(error, SimulationError)
+            yield self.describe(error, Stage.ASSEMBLY if is_pose else Stage.MECHANISM)
+            return
+        for path, distance in error.errors.items():
+            what = self.tree.by_path.get(path)
+            name = f"{type(what).__name__} '{what.name}'" if what is not None else f"'{path}'"
+            size = f"{distance:.3g}" if isfinite(distance) else "an unknown amount"
+            others = "" if len(error.errors) == 1 else f", with {len(error.errors) - 1} others"
+            yield Obstacle(
+                Stage.ASSEMBLY,
+                path,
+                f"no pose near the default one fulfils {name}{others}: the best is off by {size}",
+            )
+
+    def find_clamps(self, mechanism: Mechanism, q: Array) -> Iterator[Obstacle]:
+        """Yield the clamped coordinates that the assembled pose takes out of their ranges."""
+        for index, info in enumerate(mechanism.coordinates):
+            prescribed = info.prescribed
+            value = float(q[index])
+            if prescribed is not None and info.clamped and not info.locked:
+                low, high = info.range
+                if not low - 1e-9 <= value <= high + 1e-9:
+                    yield Obstacle(
+                        Stage.CLAMP,
+                        info.path,
+                        f"the prescribed_function of '{info.name}' starts at {value:.6g}, outside "
+                        f"the range {low:.6g} to {high:.6g} that it is clamped to",
+                    )
+        for index in find_unclamped(mechanism, q):
+            info = mechanism.coordinates[index]
+            if abs(q[index] - info.default_value) < 1e-9 or info.locked:
+                # A default value outside of the range is another rule's.
+                continue
+            low, high = info.range
+            yield Obstacle(
+                Stage.CLAMP,
+                info.path,
+                f"the constraints take '{info.name}' to {q[index]:.6g}, outside the range "
+                f"{low:.6g} to {high:.6g} that it is clamped to",
+            )
+
+    # ------------------------------------------------------------------------------ accelerations
+    def evaluate(self, mechanism: Mechanism, q: Array, forces: Forces) -> Iterator[Obstacle]:
+        """Evaluate the accelerations in the default pose, and yield what is wrong with them."""
+        try:
+            u = mechanism.project_speeds(q, {})
+            system = System(mechanism, forces, code=AT_HAND)
+        except OsimliteError as error:
+            yield self.describe(error, Stage.ACCELERATION)
+            return
+        try:
+            state = system.state.pack(q.tolist(), u.tolist())
+        except OsimliteError as error:
+            yield self.describe(error, Stage.ACCELERATION)
+            return
+        status = _evaluate(system, state)
+        if status == OUTCOME.SINGULAR_MASS:
+            if not _is_indefinite(mechanism, q):
+                yield self.describe_inertia(system, state)
+        elif status != OUTCOME.OK:
+            refusal = system.refusal(status, 0.0, state) if status is not None else None
+            culprits = [*self.find_culprits(mechanism, forces, q, u)]
+            if culprits:
+                yield from culprits
+            elif isinstance(refusal, SimulationError) and status == OUTCOME.SINGULAR_RATES:
+                yield self.describe(refusal, Stage.ACCELERATION)
+            elif status is None:
+                yield Obstacle(Stage.ACCELERATION, "", "the accelerations are no numbers")
+        elif not np.isfinite(np.array(system.found())[: 2 * len(system.order)]).all():
+            culprits = [*self.find_culprits(mechanism, forces, q, u)]
+            yield from culprits or [Obstacle(Stage.ACCELERATION, "", "the accelerations are no numbers")]
+        else:
+            yield from self.find_rates(system)
+
+    def find_rates(self, system: System) -> Iterator[Obstacle]:
+        """Yield the auxiliary states whose rates are no numbers."""
+        rates = system.found()[2 * len(system.order) :]
+        for variable, rate in zip(system.state.variables, rates, strict=True):
+            if not isfinite(rate):
+                owner, _, name = variable.path.rpartition("/")
+                what = self.tree.by_path.get(owner)
+                called = f"{type(what).__name__} '{what.name}'" if what is not None else owner
+                yield Obstacle(
+                    Stage.RATE,
+                    owner,
+                    f"the rate of {name} of {called} is no number where the model starts: "
+                    "OpenSim's integrator stops there unless muscles are equilibrated first",
+                )
+
+    def describe_inertia(self, system: System, state: list[float]) -> Obstacle:
+        """Return the obstacle of a mass matrix that cannot be divided by."""
+        refusal = system.refusal(OUTCOME.SINGULAR_MASS, 0.0, state)
+        message = refusal.message.partition(";")[0]
+        named = re.search(r"coordinate '([^']*)'", message)
+        for info in system.mechanism.coordinates:
+            if named is not None and info.name == named[1]:
+                return Obstacle(Stage.INERTIA, info.path, message)
+        return Obstacle(Stage.INERTIA, "", message)
+
+    def find_culprits(self, mechanism: Mechanism, forces: Forces, q: Array, u: Array) -> Iterator[Obstacle]:
+        """Yield the forces that alone make accelerations that are no numbers."""
+        if not _is_computed(mechanism, Forces(()), q, u):
+            # Other rules report NaN among the numbers of the mechanism.
+            return
+        for element in forces.elements:
+            alone = Forces((element,), controls=forces.controls)
+            if _is_computed(mechanism, alone, q, u):
+                continue
+            component: Any = self.tree.by_path.get(element.path)
+            kind = type(component).__name__ if component is not None else "force"
+            yield Obstacle(
+                Stage.ACCELERATION,
+                element.path,
+                f"{kind} '{element.path.rpartition('/')[2]}' gives no number in the default pose, "
+                "so that every acceleration is NaN or infinite",
+            )
+
+    # ------------------------------------------------------------------------------------ helpers
+    def describe(self, error: OsimliteError, stage: Stage, path: str = "") -> Obstacle:
+        """Return an error of the builder as an obstacle, at the component that it names."""
+        if isinstance(error, UnsupportedError):
+            stage = Stage.UNSUPPORTED
+        known = self.tree.by_path
+        for named in _QUOTED_PATH.findall(error.message):
+            if not path and named in known:
+                path = named
+        return Obstacle(stage, path, error.message)
+
+
+def _is_indefinite(mechanism: Mechanism, q: Array) -> bool:
+    """Return whether a mass matrix has an inverse, but negative eigenvalues: OpenSim computes with it.
+
+    It comes from inertias with negative moments, which another rule reports.
+    """
+    try:
+        values = np.linalg.eigvalsh(mechanism.mass_matrix(q))
+    except (OsimliteError, np.linalg.LinAlgError):
+        return False
+    sizes = np.abs(values)
+    return bool(len(values) and values.min() < 0.0 and sizes.min() > SINGULAR * sizes.max())
+
+
+def _is_computed(mechanism: Mechanism, forces: Forces, q: Array, u: Array) -> bool:
+    """Return whether a mechanism has accelerations under some forces, or they cannot be told apart."""
+    try:
+        system = System(mechanism, forces, code=AT_HAND)
+    except OsimliteError:
+        # A probe reads another element.
+        return True
+    status = _evaluate(system, system.state.pack(q.tolist(), u.tolist()))
+    if status == OUTCOME.OK:
+        return bool(np.isfinite(np.array(system.found())[: 2 * len(system.order)]).all())
+    return status in (OUTCOME.SINGULAR_MASS, OUTCOME.SINGULAR_RATES, OUTCOME.UNSOLVED)
+
+
+def _evaluate(system: System, state: list[float]) -> int | None:
+    """Evaluate the accelerations and return the status, or None if a result is not finite.
+
+    Kernels that run as Python raise where machine code computes a number that is none.
+    """
+    try:
+        return system.realize(0.0, state, STAGE.ACCELERATION)
+    except (ArithmeticError, ValueError):
+        return None
+    except OsimliteError:
+        return OUTCOME.FAILED

@@ -1,0 +1,122 @@
+"""Where the length of a path jumps: points that come and go, ways around a surface that change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from osimlite.lint.measures import Jump
+from osimlite.lint.measuring.sweeps import Sweep
+from osimlite.mechanics.kernels.paths import CONDITIONAL
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
+from osimlite.simulation.paths import Paths
+
+LEAST = 1e-3
+"""A jump (m) that is told; smaller ones are not looked for."""
+ASIDE = 1e-4
+"""How far (rad or m) on either side of a jump lengths are taken: OpenSim's conditional points, which come 1e-5 before
+their range and go 1e-5 after it, are all there or gone then."""
+
+
+class Suspect(NamedTuple):
+    """An interval of a sweep in which the length of a path may jump."""
+
+    # by how much the length changes otherwise than next to the interval, m; infinite at a conditional point
+    excess: float
+    usual: float  # the change next to it, m
+    sweep: Sweep  # of a coordinate
+    path: int  # number of the path
+    pose: int  # number of the pose before the interval
+    ends: tuple[float, float]  # of the interval
+
+
+def jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[Jump]:
+    """The greatest jump of the length of each path that has one.
+
+    They are looked for where conditional points come or go, and between values where a length changes otherwise than
+    next to them: there a jump can hardly be greater than the difference.
+    """
+    suspects = [suspect for sweep in looked_at for suspect in _suspects(paths, sweep)]
+    if not suspects:
+        return
+    values = _narrowed(paths, suspects)
+    sides = np.array([_beside(item, value) for item, value in zip(suspects, values, strict=True)])
+    sides = sides.reshape(2 * len(suspects), -1)
+    both = paths.system.lengths_of([item.path for item in suspects for _ in range(2)], sides)
+    sizes = np.abs(np.diff(both.reshape(-1, 2), axis=1))[:, 0].tolist()
+    greatest: dict[int, int] = {}
+    for k in sorted(range(len(suspects)), key=lambda k: (suspects[k].path, -suspects[k].excess)):
+        suspect, values_of = suspects[k], suspects[k].sweep.values
+        known = sizes[greatest[suspect.path]] if suspect.path in greatest else LEAST
+        is_inside = values_of[0] + ASIDE < values[k] < values_of[-1] - ASIDE
+        if is_inside and sizes[k] > known and not suspect.excess < known:
+            greatest[suspect.path] = k
+    names = [*paths.routes]
+    for path, k in greatest.items():
+        sweep, name = suspects[k].sweep, names[path]
+        yield Jump(name, sizes[k], sweep.pose(values[k]), _changed(paths, name, sides[2 * k : 2 * k + 2]))
+
+
+def _suspects(paths: Paths, sweep: Sweep) -> Iterator[Suspect]:
+    changes = np.diff(sweep.lengths, axis=0)
+    usual = np.full_like(changes, np.nan)
+    if len(changes) > 2:
+        usual[1:-1] = 0.5 * changes[:-2] + 0.5 * changes[2:]
+        usual[0], usual[-1] = 2.0 * changes[1] - changes[2], 2.0 * changes[-2] - changes[-3]
+    excess, values = np.abs(changes - usual), sweep.values
+    for path, route in enumerate(paths.routes.values()):
+        if not isinstance(route, ThroughPoints):
+            continue
+        for point in route.points:
+            if point.kind == CONDITIONAL and point.coordinate == sweep.place:
+                for end in point.range:
+                    yield Suspect(inf, 0.0, sweep, path, 0, (end, end))
+        for k in np.flatnonzero(excess[:, path] > LEAST) if route.surfaces else ():
+            ends = float(values[k]), float(values[k + 1])
+            yield Suspect(float(excess[k, path]), float(usual[k, path]), sweep, path, int(k), ends)
+
+
+def _narrowed(paths: Paths, suspects: Sequence[Suspect]) -> list[float]:
+    """The value in each interval at which the length of the path changes most, besides the usual change."""
+    low, high = np.array([item.ends for item in suspects]).T
+    first, last, active = low, high, high - low > ASIDE
+    begin, end = (np.array([item.sweep.poses[item.pose + k] for item in suspects]) for k in (0, 1))
+    rate = np.array([item.usual for item in suspects]) / np.where(active, high - low, 1.0)
+    before, after = (np.array([item.sweep.lengths[item.pose + k, item.path] for item in suspects]) for k in (0, 1))
+    while places := np.flatnonzero(active).tolist():
+        middle = 0.5 * (low + high)
+        part = (middle - first) / (last - first)
+        poses = (begin + part[:, None] * (end - begin))[places]
+        here = np.full(len(suspects), np.nan)
+        here[places] = paths.system.lengths_of([suspects[k].path for k in places], poses)
+        smooth = rate * (middle - low)
+        is_before = np.abs(here - before - smooth) > np.abs(after - here - smooth)
+        moves = active & is_before
+        high, after = np.where(moves, middle, high), np.where(moves, here, after)
+        moves = active & ~is_before
+        low, before = np.where(moves, middle, low), np.where(moves, here, before)
+        active = high - low > ASIDE
+    return np.where([item.excess < inf for item in suspects], 0.5 * (low + high), low).tolist()
+
+
+def _beside(suspect: Suspect, value: float) -> Array:
+    """The poses (2, n) on both sides of a value."""
+    beside = np.array([value - ASIDE, value + ASIDE])
+    return suspect.sweep.at(beside, suspect.sweep.before(beside))
+
+
+def _changed(paths: Paths, name: str, sides: Array) -> tuple[str, ...]:
+    """Names of the points and surfaces that a path runs through on one side only."""
+    route = paths.routes[name]
+    assert isinstance(route, ThroughPoints)
+    before, after = ({number for number, _ in paths.points(q)[name]} for q in sides)
+    count = len(route.points)
+    names = [
+        route.points[k].name or f"point {k + 1}" if k < count else route.surfaces[(k - count) // 2].tangent.name
+        for k in sorted(before ^ after)
+    ]
+    return tuple(dict.fromkeys(names))

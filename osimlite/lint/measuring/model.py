@@ -1,0 +1,139 @@
+"""All that is measured of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from osimlite.errors import UnsupportedError
+from osimlite.lint.measures import (
+    LengthOnSurface,
+    Measures,
+    NoMachineCodeError,
+    Pose,
+    swept_places,
+    together,
+)
+from osimlite.lint.measuring.jumps import jumps
+from osimlite.lint.measuring.muscles import fibers_of, reach_of, start_of
+from osimlite.lint.measuring.points import moving_points
+from osimlite.lint.measuring.sweeps import Sweep, sweeps
+from osimlite.lint.measuring.wrapping import wrappings
+from osimlite.mechanics.multibody.constraints import Coupler, Lock, Prescribed
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.model import Model
+from osimlite.simulation.elements.gather import GEODESIC
+from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
+from osimlite.simulation.engines.linking import AT_HAND
+from osimlite.simulation.engines.machine_code import has_machine_code
+from osimlite.simulation.paths import Paths
+
+NEEDS_MACHINE_CODE = (
+    "so many surfaces take minutes in Python: install osimlite where a C++ compiler is found, "
+    "or run: pip install 'osimlite[jit]'"
+)
+"""Why paths around many surfaces are not measured."""
+
+MAX_LOOP_CONSTRAINTS = 8
+"""Constraints other than couplers of a model that is measured. Shoulders and knees of publications have up to six."""
+
+MIDDLE = 0.5
+"""Part of a range in which fibers are looked at: at the ends, few muscles have not reached a limit."""
+
+
+@np.errstate(all="ignore")
+def measured(
+    model: Model,
+    *,
+    compiles: bool,
+    known: tuple[Measures, Measures] | None = None,
+    mechanism: Mechanism | None = None,
+) -> Measures:
+    """Measure the paths and muscles of a model.
+
+    Args:
+        model: what is measured.
+        compiles: whether kernels that are in no library or file yet are compiled, which takes longer than to do
+            without for a model that has few surfaces.
+        known: what was measured when some paths were others, or not there, and all else as it is; and what still holds.
+        mechanism: of the model; made if left out.
+
+    Raises:
+        UnsupportedError: a path, a joint or a constraint cannot be computed.
+        ModelError: something makes no sense.
+        SimulationError: the constraints allow no default pose, or there are no lengths in it.
+        NoMachineCodeError: the model has many surfaces, and kernels run as Python only.
+    """
+    before, still = known if known is not None else (None, None)
+    if compiles and not has_machine_code():
+        raise NoMachineCodeError(NEEDS_MACHINE_CODE)
+    code = None if compiles else AT_HAND
+    paths = Paths(model, code=code, left_out=still.swept if still is not None else (), mechanism=mechanism)
+    has_surfaces = any(isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values())
+    around = paths.around_surfaces(model, GEODESIC, code) if has_surfaces else None
+    _expect_few_loops(paths.mechanism)
+    start = paths.mechanism.assemble({})
+    default = np.array(list(paths.lengths(start).values()))
+    looked_at = sweeps(paths, start, set() if still is None else swept_places(still))
+    if before is not None and {sweep.place for sweep in looked_at} != swept_places(before):
+        # All paths are looked at in the same poses.
+        return measured(model, compiles=compiles, mechanism=mechanism)
+    starts, reaches = [], []
+    ends = dict(zip(paths.names, zip(default, _ends(looked_at, default), strict=True), strict=True))
+    for fibers in fibers_of(model, paths.mechanism, ends):
+        length, ((shortest, short), (longest, long)) = ends[fibers.path]
+        begun = start_of(fibers, length)
+        starts += [begun] if begun is not None else []
+        reaches += [reach_of(fibers, shortest, True, short), reach_of(fibers, longest, False, long)]
+    moved = {sweep.place: sweep.moved for sweep in looked_at}
+    result = Measures(
+        {name: tuple(place for place, own in moved.items() if own[k]) for k, name in enumerate(paths.names)},
+        [*wrappings(around, paths, start, looked_at)] if around is not None else [],
+        [*jumps(paths, looked_at)],
+        [*_on_surfaces(paths, start, looked_at)],
+        [*moving_points(paths)],
+        starts,
+        reaches,
+    )
+    return result if still is None else together(still, result)
+
+
+def _on_surfaces(paths: Paths, start: Array, looked_at: list[Sweep]) -> Iterator[LengthOnSurface]:
+    """The lengths on surfaces that are no lengths, of each path on each surface the first that is found."""
+    poses = [Pose(), *(sweep.pose(value) for sweep in looked_at for value in sweep.values)]
+    every = np.concatenate([start[None], *(sweep.poses for sweep in looked_at)])
+    for name, surface, lengths in paths.system.all_on_surfaces(every, paths.routes):
+        for k in np.flatnonzero(~(lengths >= 0.0))[:1]:
+            yield LengthOnSurface(name, surface, float(lengths[k]), poses[k])
+
+
+def _expect_few_loops(mechanism: Mechanism) -> None:
+    """Refuse models with too many loops to assemble poses within the time of a check.
+
+    Couplers are not counted: a spine has a hundred, and they are assembled at once.
+
+    Raises:
+        UnsupportedError: there are more than `MAX_LOOP_CONSTRAINTS` constraints that close loops.
+    """
+    count = sum(not isinstance(each, Coupler | Lock | Prescribed) for each in mechanism.constraints)
+    if count > MAX_LOOP_CONSTRAINTS:
+        raise UnsupportedError(
+            f"{count} constraints of it close loops, and the poses of at most {MAX_LOOP_CONSTRAINTS} are measured"
+        )
+
+
+def _ends(looked_at: list[Sweep], default: Array) -> Iterator[tuple[tuple[float, Pose], tuple[float, Pose]]]:
+    """Where each path is shortest and where it is longest, by default and in the middle of the ranges."""
+    poses, rows = [Pose()], [default[None]]
+    for sweep in looked_at:
+        low, high = sweep.info.range
+        inside = np.flatnonzero(np.round(np.abs((sweep.values - low) / (high - low) - 0.5), 9) <= 0.5 * MIDDLE)
+        poses += [sweep.pose(value) for value in sweep.values[inside]]
+        rows.append(sweep.lengths[inside])
+    lengths = np.concatenate(rows)
+    unknown = np.isnan(lengths) & ~np.isnan(default)
+    ends = np.argmin(np.where(unknown, np.inf, lengths), axis=0), np.argmax(np.where(unknown, -np.inf, lengths), axis=0)
+    for path, (short, long) in enumerate(zip(*ends, strict=True)):
+        yield (float(lengths[short, path]), poses[short]), (float(lengths[long, path]), poses[long])

@@ -1,0 +1,111 @@
+"""Muscles where they start, and where their paths are shortest and longest, in equilibrium at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Iterator, Sequence
+from contextlib import suppress
+from itertools import repeat
+from math import nan
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from osimlite.errors import ModelError
+from osimlite.lint.measures import Pose, Reach, Start
+from osimlite.mechanics.laws.muscles import MuscleInputs
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.schema.model import Model
+from osimlite.schema.muscles import Muscle
+from osimlite.schema.states import states_of
+from osimlite.simulation.elements.gather import ElementBuilder
+from osimlite.simulation.elements.kind import Kind, kind_of_class
+from osimlite.simulation.elements.parameters import Fields, Number, Numbers, Together
+
+ROUNDING = 1e-9
+REST = 0.01
+"""The activation of a muscle at rest: none of Thelen's or Millard's has less by default."""
+
+
+class Fibers(NamedTuple):
+    """A muscle with its law, which is called as Python: some hundred times, where compiling it would take longer."""
+
+    path: str  # of the muscle
+    kind: Kind  # of the muscle
+    component: Any  # the muscle
+    values: tuple[Any, ...]  # of the parameters of the law, but for the control
+
+    @property
+    def is_elastic(self) -> bool:
+        """Whether there is something to bring into equilibrium."""
+        return not set(self.kind.settled).isdisjoint(states_of(self.component))
+
+    def starts(self) -> dict[str, float]:
+        """The states where they start."""
+        return {state.name: state.at_start(self.component) for state in self.kind.states}
+
+    def settled(self, length: float, states: dict[str, float]) -> dict[str, float]:
+        """The states in equilibrium at a length of the path (m), NaN if there is none."""
+        if not self.is_elastic:
+            return states
+        is_found, *result = self._asked(self.kind.equilibrium, length, states)
+        return states | dict(zip(self.kind.settled, result if is_found else repeat(nan), strict=False))
+
+    def at(self, length: float, states: dict[str, float]) -> dict[str, float]:
+        """What the law gives by the names of its outputs, the path at rest; tension and fiber length are normalized."""
+        known = dict(zip(self.kind.outputs, map(float, self._asked(self.kind.law, length, states)), strict=False))
+        known["tension"] /= self.component.max_isometric_force or nan
+        known["fiber_length"] /= self.component.optimal_fiber_length
+        return known
+
+    def _asked(self, law: Callable[..., Any] | None, length: float, states: dict[str, float]) -> Sequence[Any]:
+        assert law is not None
+        try:
+            result: Sequence[Any] = law(
+                MuscleInputs(length, 0.0, states.get("activation", 1.0), **states), *self.values
+            )
+        except (ArithmeticError, ValueError):
+            # Machine code has no number there.
+            return [nan] * len(self.kind.outputs)
+        return result
+
+
+def fibers_of(model: Model, mechanism: Mechanism, wanted: Container[str]) -> Iterator[Fibers]:
+    """The muscles that pull, whose laws are given numbers: those of Thelen, Millard, De Groote, Meyer.
+
+    Args:
+        model: whose muscles.
+        mechanism: of it.
+        wanted: paths of the muscles that are asked for.
+    """
+    builder = ElementBuilder(model, mechanism, Path())
+    for muscle in model.components(Muscle):
+        kind = kind_of_class(type(muscle))
+        if kind is None or not muscle.appliesForce or builder.path(muscle) not in wanted:
+            continue
+        _, *terms = kind.terms
+        parts = (part for term in terms for part in (term.terms if isinstance(term, Together) else (term,)))
+        if not all(isinstance(part, Fields | Number | Numbers) for part in parts):
+            continue
+        # What OpenSim refuses, other rules have told.
+        with suppress(ModelError):
+            if kind.check is not None:
+                kind.check(builder, muscle)
+            yield Fibers(builder.path(muscle), kind, muscle, tuple(term.read(builder, muscle) for term in terms))
+
+
+def start_of(fibers: Fibers, length: float) -> Start | None:
+    """Start and equilibrium at a length of the path, m; None of a muscle that has nothing to bring into equilibrium."""
+    if not fibers.is_elastic:
+        return None
+    states = fibers.starts()
+    one, two = fibers.at(length, states), fibers.at(length, fibers.settled(length, states))
+    lengths, tensions = ((one[name], two[name]) for name in ("fiber_length", "tension"))
+    return Start(fibers.path, lengths, tensions)
+
+
+def reach_of(fibers: Fibers, length: float, is_active: bool, pose: Pose) -> Reach:
+    """Fibers in equilibrium at a length of the path, m."""
+    known = fibers.at(length, fibers.settled(length, fibers.starts() | {"activation": 1.0 if is_active else REST}))
+    numbers = fibers.values[0]
+    least = getattr(numbers, "smallest", getattr(numbers, "shortest", 0.0)) / fibers.component.optimal_fiber_length
+    is_limit = known["fiber_length"] <= least * (1.0 + ROUNDING) or known["cos_pennation"] <= 0.0
+    return Reach(fibers.path, is_active, pose, known["fiber_length"], is_limit)

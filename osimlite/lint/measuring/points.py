@@ -1,0 +1,56 @@
+"""Moving points at the ends of their coordinates' ranges, outside which OpenSim lets them rest and says they move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from osimlite.lint.measures import MovingPoint, Value
+from osimlite.mechanics.kernels.paths import MOVING
+from osimlite.mechanics.multibody.functions import Scaled
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.simulation.elements.geometries.paths.geometry_path import Node, ThroughPoints
+from osimlite.simulation.paths import Paths
+
+
+def moving_points(paths: Paths) -> Iterator[MovingPoint]:
+    """Each moving point at both ends of the range of its coordinate."""
+    for name, route in paths.routes.items():
+        for point in route.points if isinstance(route, ThroughPoints) else ():
+            if point.kind != MOVING:
+                continue
+            info = paths.mechanism.coordinates[point.coordinate]
+            low, high = _given(point)
+            for end in info.range:
+                inside = min(max(end, low), high)
+                place, rate = _at(point, end)
+                yield MovingPoint(
+                    name,
+                    point.name,
+                    Value(info.name, end, info.unit),
+                    abs(end - inside),
+                    float(np.linalg.norm(place - _at(point, inside)[0])),
+                    float(np.linalg.norm(rate)),
+                )
+
+
+def _at(point: Node, value: float) -> tuple[Array, Array]:
+    """Place of a point at a value of its coordinate, and the derivative of it."""
+    result = [function.evaluate(np.array([value])) for function in point.functions]
+    return np.array([place for place, _, _ in result]), np.array([slope[0] for _, slope, _ in result])
+
+
+def _given(point: Node) -> tuple[float, float]:
+    """The values of the coordinate that all functions of a point are given for."""
+    ranges = [_range(function) for function in point.functions]
+    return max(low for low, _ in ranges), min(high for _, high in ranges)
+
+
+def _range(function: Any) -> tuple[float, float]:
+    while isinstance(function, Scaled):
+        function = function.function
+    x: Any = getattr(function, "x", getattr(function, "knots", ()))
+    return (float(x[0]), float(x[-1])) if len(x) else (-inf, inf)

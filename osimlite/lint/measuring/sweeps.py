@@ -1,0 +1,130 @@
+"""The poses that are looked at: the default one, and each coordinate alone over its range."""
+
+from __future__ import annotations
+
+from collections.abc import Container
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from osimlite.base.records import dataclass
+from osimlite.errors import SimulationError
+from osimlite.lint.measures import Pose, Value
+from osimlite.mechanics.multibody.linear import stacked
+from osimlite.mechanics.multibody.parts import CoordinateInfo
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.simulation.paths import Paths
+
+VALUES, TIED_VALUES, TIED_POSES = 9, 5, 40
+"""Of each coordinate; of each that constraints tie to others, whose poses take long to find; and how many of these
+poses are found at most."""
+WIDEST = 4.0 * pi
+"""A wider range (rad or m) stands for none."""
+STILL = 1e-9
+"""A length that changes by less (m) does not."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """A coordinate over its range, the others as in the default pose, or as near to it as constraints let them be."""
+
+    paths: Paths  # whose lengths change
+    place: int  # of the coordinate in the mechanism
+    poses: Array  # values of all coordinates (k, n), those of this one increasing; as far as constraints allow
+    is_tied: bool  # whether a constraint moves others with the coordinate
+    lengths: Array  # of all paths there (k, p), m
+
+    @property
+    def values(self) -> Array:
+        """Values (k,) of the coordinate, rad or m."""
+        return self.poses[:, self.place]
+
+    @property
+    def moved(self) -> NDArray[np.bool_]:
+        """Whether the length of each path (p,) changes."""
+        return np.nan_to_num(np.ptp(self.lengths, axis=0)) > STILL
+
+    @property
+    def info(self) -> CoordinateInfo:
+        """The coordinate."""
+        return self.paths.mechanism.coordinates[self.place]
+
+    def value(self, value: float) -> Value:
+        """A value of the coordinate, with its name."""
+        return Value(self.info.name, float(value), self.info.unit)
+
+    def pose(self, value: float) -> Pose:
+        """What people call the pose at a value of the coordinate."""
+        return Pose((self.value(value),))
+
+    def at(self, values: Array, place: NDArray[np.intp]) -> Array:
+        """Values (k, n) of all coordinates where this one has a value, along straight lines between the poses.
+
+        Args:
+            values: of the coordinate (k,), rad or m.
+            place: numbers (k,) of the poses that the lines begin at.
+        """
+        before, after = self.poses[place], self.poses[place + 1]
+        part = (values - before[:, self.place]) / (after[:, self.place] - before[:, self.place])
+        return before + part[:, None] * (after - before)
+
+    def before(self, values: Array) -> NDArray[np.intp]:
+        """Numbers (k,) of the poses before values of the coordinate."""
+        return np.clip(np.searchsorted(self.values, values), 1, len(self.values) - 1) - 1
+
+
+def sweeps(paths: Paths, start: Array, others: Container[int] = ()) -> list[Sweep]:
+    """A sweep of each coordinate that changes the length of a path.
+
+    Args:
+        paths: that are looked at.
+        start: the default pose (n,).
+        others: places of coordinates that change the length of a path that is not among these.
+    """
+    are_tied, left = tied(paths, start), TIED_POSES
+    result: list[tuple[int, Array, bool]] = []
+    for place, info in enumerate(paths.mechanism.coordinates):
+        low, high = info.range
+        if info.locked or info.prescribed is not None or info.yielding or not 0.0 < high - low <= WIDEST:
+            continue
+        is_tied = bool(are_tied[place])
+        if is_tied and left < TIED_VALUES:
+            continue
+        left -= is_tied * TIED_VALUES
+        poses = _poses(paths, start, place, np.linspace(low, high, TIED_VALUES if is_tied else VALUES), is_tied)
+        if len(poses) > 1:
+            result.append((place, poses, is_tied))
+    rows = paths.system.lengths(np.concatenate([np.empty((0, len(start))), *(poses for _, poses, _ in result)]))
+    swept = []
+    for place, poses, is_tied in result:
+        own, rows = np.split(rows, [len(poses)])
+        swept.append(Sweep(paths, place, poses, is_tied, own))
+    return [sweep for sweep in swept if sweep.place in others or sweep.moved.any()]
+
+
+def _poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool) -> Array:
+    """The poses with these values of a coordinate, from the default one to where constraints let it go no further."""
+    poses = np.tile(start, (len(values), 1))
+    poses[:, place] = values
+    if not is_tied:
+        return poses
+    result: list[Array] = []
+    above = values >= start[place]
+    for away in (poses[above], poses[~above][::-1]):
+        for q in away:
+            try:
+                result.append(paths.mechanism.assemble(q, kept=(place,)))
+            except SimulationError:
+                break
+    return np.array(sorted(result, key=lambda q: float(q[place]))).reshape(-1, len(start))
+
+
+def tied(paths: Paths, start: Array) -> Array:
+    """Whether each coordinate (n,) is in the equations of a constraint."""
+    constraints = paths.mechanism.constraints
+    if not constraints:
+        return np.zeros(len(start), dtype=bool)
+    state = paths.mechanism.at(start)
+    rows, _ = stacked([item.velocity_equations(state) for item in constraints])
+    return np.abs(rows).max(axis=0) > 0.0

@@ -1,0 +1,79 @@
+"""Paths around surfaces in OpenSim's way beside the same along geodesics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from random import Random
+
+import numpy as np
+
+from osimlite.lint.measures import Pose, Wrapping
+from osimlite.lint.measuring.sweeps import Sweep
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.simulation.paths import Paths
+
+TOGETHER = 64
+"""Poses with values of all coordinates within their ranges, at random but always the same."""
+
+
+ASIDE, NEAR = 1e-7, 1e-4
+"""How far (rad or m) beside a pose a length is computed again, and by how much (m) it may differ there."""
+
+
+def wrappings(geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[Sweep]) -> Iterator[Wrapping]:
+    """Each path around surfaces: by how much it is longer than along geodesics by default, and where by most.
+
+    Args:
+        geodesic: those of the paths that have surfaces, along geodesics.
+        paths: all of them in OpenSim's way.
+        start: the default pose (n,).
+        looked_at: the sweeps.
+    """
+    free = [sweep for sweep in looked_at if not sweep.is_tied]
+    together = _together(start, free)
+    poses = np.concatenate([start[None], *(sweep.poses for sweep in looked_at), together])
+    columns = [paths.names.index(name) for name in geodesic.names]
+    swept = [sweep.lengths[:, columns] for sweep in looked_at]
+    ends = np.split(paths.system.lengths(np.concatenate([start[None], together]))[:, columns], [1])
+    excesses = np.concatenate([ends[0], *swept, ends[1]]) - geodesic.system.lengths(poses)
+    for own, (name, path) in enumerate(zip(geodesic.names, columns, strict=True)):
+        route, excess = paths.routes[name], excesses[:, own]
+        around = tuple(surface.tangent.name for surface in getattr(route, "surfaces", ()) if surface.law)
+        if not around:
+            continue
+        moved = [sweep for sweep in free if sweep.moved[path]]
+
+        def told(k: int, moved: Sequence[Sweep] = moved) -> tuple[Pose, Array]:
+            """A pose as it is told, where coordinates that do not matter are as by default."""
+            if k == 0:
+                return Pose(), start
+            for sweep in looked_at:
+                if k <= len(sweep.poses):
+                    return sweep.pose(sweep.values[k - 1]), sweep.poses[k - 1]
+                k -= len(sweep.poses)
+            q, places = start.copy(), [sweep.place for sweep in moved]
+            q[places] = together[k - 1][places]
+            return Pose(tuple(sweep.value(q[sweep.place]) for sweep in moved)), q
+
+        order = np.argsort(-np.nan_to_num(np.abs(excess)), kind="stable").tolist()
+        certain = (k for k in order if _is_certain(geodesic, paths, own, path, excess[k], told(k)[1]))
+        worst = next(certain, order[-1])
+        yield Wrapping(name, around, float(excess[0]), float(excess[worst]), told(worst)[0])
+
+
+def _together(start: Array, free: Sequence[Sweep]) -> Array:
+    """Poses (k, n) with values of all coordinates anywhere in their ranges."""
+    # Python's own generator, since pydantic has loaded it: `numpy.random` would take five milliseconds more.
+    generator = Random(0)
+    parts = np.array([[generator.random() for _ in free] for _ in range(TOGETHER)]).reshape(TOGETHER, len(free))
+    values = [low + parts[:, k] * (high - low) for k, (low, high) in enumerate(sweep.info.range for sweep in free)]
+    together = np.tile(start, (TOGETHER, 1))
+    together[:, [sweep.place for sweep in free]] = np.array(values).reshape(len(free), TOGETHER).T
+    return together
+
+
+def _is_certain(geodesic: Paths, paths: Paths, own: int, path: int, excess: float, q: Array) -> bool:
+    """Whether a path is as much too long right beside a pose; if not, rounding decides, or what nobody is told of."""
+    beside = np.array([q - ASIDE, q + ASIDE])
+    there = paths.system.lengths_of([path] * 2, beside) - geodesic.system.lengths_of([own] * 2, beside)
+    return bool((np.abs(there - excess) < NEAR).all())

@@ -1,5 +1,0 @@
-"""Paths and muscles measured over the ranges of the coordinates, for the rules of the linter that are about that."""
-
-from osimlite.measuring.model import measured
-
-__all__ = ["measured"]

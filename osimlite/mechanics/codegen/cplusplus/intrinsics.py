@@ -1,0 +1,274 @@
+"""Functions that kernels call and that are no kernels: Python's own, those of `math`, and the operations on vectors.
+
+Each has a rule for its type and one for its text. Their C++ is in the header `kernel_runtime.h`.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, Protocol
+
+from osimlite.mechanics.codegen.cplusplus.types import (
+    BOOLEAN,
+    FLOAT,
+    INTEGER,
+    Dual,
+    Pointer,
+    Scalar,
+    Type,
+    dual,
+    is_integral,
+    is_number,
+    join_types,
+    pointer_to,
+)
+from osimlite.mechanics.kernels import pointers
+from osimlite.mechanics.laws import carried
+
+
+class Reader(Protocol):
+    """What the rules need of the inference."""
+
+    def constant_index(self, node: ast.expr) -> int | None:
+        """Return the value of an integer constant."""
+
+
+Nodes = Sequence[ast.expr]
+Types = Sequence[Type]
+
+
+class Intrinsic(NamedTuple):
+    """How a function that is no kernel is written.
+
+    Attributes:
+        infer: returns the type of the result from the arguments and their types.
+        write: returns the text from those of the arguments, their types, and the type of the result.
+        early: type of the result while the types of the arguments are not known yet, if it depends on none.
+        has_effects: whether it may read and write memory.
+    """
+
+    infer: Callable[[Reader, Nodes, Types], Type]
+    write: Callable[[Sequence[str], Types, Type], str]
+    early: Type | None = None
+    has_effects: bool = False
+
+
+def _check_numbers(kinds: Types, least: int, most: int) -> None:
+    if not least <= len(kinds) <= most:
+        raise TypeError(f"called with {len(kinds)} arguments")
+    for kind in kinds:
+        if not is_number(kind):
+            raise TypeError(f"{kind!r} is no number")
+
+
+def cast_to(code: str, have: Type, want: Type) -> str:
+    """Return the text of a number as one of another type."""
+    if have is want:
+        return code
+    return f"static_cast<{want!r}>({code})" if isinstance(want, Scalar) else f"{want!r}({code})"
+
+
+def _dual_or_float(kinds: Types) -> Type:
+    return next((kind for kind in kinds if isinstance(kind, Dual)), FLOAT)
+
+
+def _convert_to_floats(codes: Sequence[str], kinds: Types) -> list[str]:
+    """Return the texts of numbers with integers as floats."""
+    return [cast_to(code, kind, FLOAT) if is_integral(kind) else code for code, kind in zip(codes, kinds, strict=True)]
+
+
+# ------------------------------------------------------------------------------------------------- families
+def _mathematics(name: str, count: int) -> Intrinsic:
+    """A function of `math` that takes numbers and returns a float or a number with derivatives."""
+
+    def infer(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+        _check_numbers(kinds, count, count)
+        return _dual_or_float(kinds)
+
+    def write(codes: Sequence[str], kinds: Types, result: Type) -> str:
+        return f"py::{name}({', '.join(_convert_to_floats(codes, kinds))})"
+
+    return Intrinsic(infer, write)
+
+
+def _declare_fixed_result(name: str, result: Type) -> Intrinsic:
+    """A function of one number whose result has the same type for every argument."""
+
+    def infer(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+        _check_numbers(kinds, 1, 1)
+        return result
+
+    def write(codes: Sequence[str], kinds: Types, result: Type) -> str:
+        return f"py::{name}({_convert_to_floats(codes, kinds)[0]})"
+
+    return Intrinsic(infer, write, result)
+
+
+def _extreme(name: str) -> Intrinsic:
+    """`min` or `max` of two numbers or more, in the order of Python's comparisons."""
+
+    def infer(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+        _check_numbers(kinds, 2, len(kinds) + 2)
+        result: Type | None = None
+        for kind in kinds:
+            result = join_types(result, kind)
+        assert result is not None
+        return result
+
+    def write(codes: Sequence[str], kinds: Types, result: Type) -> str:
+        text = codes[0]
+        for code in codes[1:]:
+            text = f"py::{name}<{result!r}>({text}, {code})"
+        return text
+
+    return Intrinsic(infer, write)
+
+
+# ------------------------------------------------------------------------------------------- Python's own
+def _infer_integer(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+    _check_numbers(kinds, 1, 1)
+    return INTEGER
+
+
+def _write_integer(codes: Sequence[str], kinds: Types, result: Type) -> str:
+    return cast_to(codes[0], kinds[0], INTEGER) if is_integral(kinds[0]) else f"py::to_integer({codes[0]})"
+
+
+def _write_rounded(name: str) -> Callable[[Sequence[str], Types, Type], str]:
+    def write(codes: Sequence[str], kinds: Types, result: Type) -> str:
+        if is_integral(kinds[0]):
+            return cast_to(codes[0], kinds[0], INTEGER)
+        return f"py::to_integer(py::{name}({codes[0]}))"
+
+    return write
+
+
+def _infer_float(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+    _check_numbers(kinds, 1, 1)
+    return _dual_or_float(kinds)
+
+
+def _write_float(codes: Sequence[str], kinds: Types, result: Type) -> str:
+    return cast_to(codes[0], kinds[0], result)
+
+
+def _infer_truth(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+    _check_numbers(kinds, 1, 1)
+    return BOOLEAN
+
+
+def _write_truth(codes: Sequence[str], kinds: Types, result: Type) -> str:
+    return codes[0] if kinds[0] is BOOLEAN else f"({codes[0]} != 0)"
+
+
+def _infer_magnitude(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+    _check_numbers(kinds, 1, 1)
+    return INTEGER if kinds[0] is BOOLEAN else kinds[0]
+
+
+def _write_magnitude(codes: Sequence[str], kinds: Types, result: Type) -> str:
+    # The overload for integers is no better match for a literal than that for floats.
+    return f"py::abs(static_cast<int64_t>({codes[0]}))" if is_integral(kinds[0]) else f"py::abs({codes[0]})"
+
+
+# -------------------------------------------------------------------------------------------------- vectors
+def _infer_offset(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+    if len(kinds) != 2 or not isinstance(kinds[0], Pointer) or not is_integral(kinds[1]):
+        raise TypeError("at() takes a vector and an integer")
+    return kinds[0]
+
+
+def _infer_call(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+    if len(kinds) != 7 or not all(isinstance(kind, Pointer) for kind in kinds[1:6]):
+        raise TypeError("call() takes an address, five vectors and an integer")
+    return INTEGER
+
+
+def _write_call(codes: Sequence[str], kinds: Types, result: Type) -> str:
+    vectors = ", ".join(repr(kind) for kind in kinds[1:6])
+    law = f"reinterpret_cast<int64_t (*)({vectors}, int64_t)>({codes[0]})"
+    return f"{law}({', '.join(codes[1:])})"
+
+
+# -------------------------------------------------------------------------------------- numbers with derivatives
+def _constant(reader: Reader, node: ast.expr) -> int:
+    value = reader.constant_index(node)
+    if value is None:
+        raise TypeError("it takes an integer constant")
+    return value
+
+
+def _infer_settled(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+    _check_numbers(kinds, 3, 3)
+    return _dual_or_float(kinds[:2])
+
+
+def _write_settled(codes: Sequence[str], kinds: Types, result: Type) -> str:
+    return f"py::settled({', '.join(_convert_to_floats(codes, kinds))})"
+
+
+def _infer_plain(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+    _check_numbers(kinds, 1, 2)
+    return FLOAT
+
+
+def _write_plain(name: str) -> Callable[[Sequence[str], Types, Type], str]:
+    return lambda codes, kinds, result: (
+        f"py::{name}({', '.join([*_convert_to_floats(codes[:1], kinds[:1]), *codes[1:]])})"
+    )
+
+
+def _infer_carrying(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+    _check_numbers(kinds, 3, 3)
+    if not 0 <= _constant(reader, nodes[1]) < _constant(reader, nodes[2]):
+        raise TypeError("there is no such direction")
+    return dual(_constant(reader, nodes[2]))
+
+
+def _write_carrying(codes: Sequence[str], kinds: Types, result: Type) -> str:
+    return f"{result!r}::along({_convert_to_floats(codes[:1], kinds[:1])[0]}, {codes[1]})"
+
+
+def _infer_carrying_room(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+    if len(kinds) != 2 or not isinstance(kinds[0], Pointer) or kinds[0].element is not FLOAT:
+        raise TypeError("it takes a vector of floats and an integer constant")
+    return pointer_to(dual(_constant(reader, nodes[1])))
+
+
+def _write_carrying_room(codes: Sequence[str], kinds: Types, result: Type) -> str:
+    return f"reinterpret_cast<{result!r}>({codes[0]})"
+
+
+UNARY = (
+    "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh", "erf", "erfc", "radians",
+)  # fmt: skip
+"""Functions of `math` of one number, by their names in Python and in the header."""
+
+INTRINSICS: dict[Any, Intrinsic] = {
+    **{getattr(math, name): _mathematics(name, 1) for name in UNARY},
+    math.atan2: _mathematics("atan2", 2),
+    math.copysign: _mathematics("copysign", 2),
+    math.fabs: _mathematics("abs", 1),
+    math.isnan: _declare_fixed_result("isnan", BOOLEAN),
+    math.isfinite: _declare_fixed_result("isfinite", BOOLEAN),
+    math.isinf: _declare_fixed_result("isinf", BOOLEAN),
+    math.floor: Intrinsic(_infer_integer, _write_rounded("floor"), INTEGER),
+    math.ceil: Intrinsic(_infer_integer, _write_rounded("ceil"), INTEGER),
+    int: Intrinsic(_infer_integer, _write_integer, INTEGER),
+    float: Intrinsic(_infer_float, _write_float),
+    bool: Intrinsic(_infer_truth, _write_truth, BOOLEAN),
+    abs: Intrinsic(_infer_magnitude, _write_magnitude),
+    min: _extreme("min"),
+    max: _extreme("max"),
+    pointers.at: Intrinsic(_infer_offset, lambda codes, kinds, result: f"({codes[0]} + {codes[1]})"),
+    pointers.call: Intrinsic(_infer_call, _write_call, INTEGER, has_effects=True),
+    carried.settled: Intrinsic(_infer_settled, _write_settled),
+    carried.is_nothing: _declare_fixed_result("is_nothing", BOOLEAN),
+    carried.plain: Intrinsic(_infer_plain, _write_plain("plain"), FLOAT),
+    carried.slope_of: Intrinsic(_infer_plain, _write_plain("slope_of"), FLOAT),
+    carried.carrying: Intrinsic(_infer_carrying, _write_carrying),
+    carried.carrying_room: Intrinsic(_infer_carrying_room, _write_carrying_room),
+}
+"""How each is written."""

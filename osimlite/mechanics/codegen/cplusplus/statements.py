@@ -1,0 +1,418 @@
+"""Functions of kernels as C++: statements, and where variables are defined."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Sequence
+from functools import cache
+
+from osimlite.mechanics.codegen.cplusplus.expressions import (
+    OPERATORS,
+    ExpressionWriter,
+    Names,
+    write_number,
+)
+from osimlite.mechanics.codegen.cplusplus.inference import WRITES, Specialisation, to_load
+from osimlite.mechanics.codegen.cplusplus.types import (
+    VOID,
+    Callee,
+    Pointer,
+    Tuple,
+    Type,
+    is_integral,
+    is_number,
+)
+from osimlite.mechanics.codegen.reader import Function, Kernel
+
+INDENT = "    "
+
+
+class FunctionWriter(ExpressionWriter):
+    """Writes one function.
+
+    Args:
+        function: the function with its types.
+        names: the library that it belongs to.
+    """
+
+    def __init__(self, function: Specialisation, names: Names) -> None:
+        super().__init__(function, names)
+        self._places = place_variables(function.function)
+
+    def write(self, name: str) -> str:
+        """Return the text of the function.
+
+        Args:
+            name: its name in C++.
+        """
+        function = self.function
+        copies, parameters = [], []
+        for parameter, kind in zip(function.given, function.arguments, strict=True):
+            own = function.variables[parameter]
+            if isinstance(kind, Callee) or own is None:
+                continue
+            local = self.local(parameter)
+            given = local if own is kind else f"{local}_given"
+            parameters.append(f"{self.names.name_type(kind)} {given}")
+            if own is not kind:
+                # The function stores wider numbers in it.
+                copies.append(f"{self.names.name_type(own)} {local} = {self.convert(given, kind, own)};")
+                copies[-1:-1] = self._take_pending()
+        outer = [
+            f"{self.names.name_type(found)} {self.local(variable)};"
+            for variable in self._places.outer
+            if (found := function.variables[variable]) is not None and not isinstance(found, Callee)
+        ]
+        lines = [*copies, *outer, *self.block(function.body)]
+        result = self.names.name_type(function.result or VOID)
+        head = f"OSIMLITE_FUNCTION {result} {name}({', '.join(parameters)}) {{"
+        return "\n".join((head, *(f"{INDENT}{line}" for line in lines), "}"))
+
+    # ------------------------------------------------------------------------------------------------- blocks
+    def block(self, body: Iterable[ast.stmt]) -> list[str]:
+        """Return the lines of some statements, each after a comment with its Python."""
+        lines: list[str] = []
+        for statement in body:
+            if isinstance(statement, ast.Pass) or (
+                isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+            ):
+                continue
+            written = self.statement(statement)
+            if written:
+                lines += [f"// {describe_statement(statement)}", *self._take_pending(), *written]
+        return lines
+
+    def _take_pending(self) -> list[str]:
+        lines, self.pending = self.pending, []
+        return lines
+
+    def inner_block(self, body: Sequence[ast.stmt]) -> list[str]:
+        """Return the lines of the body of a compound statement, indented."""
+        before, self.pending = self.pending, []
+        lines = [f"{INDENT}{line}" for line in self.block(body)]
+        self.pending = before
+        return lines
+
+    def statement(self, node: ast.stmt) -> list[str]:
+        """Return the lines of one statement."""
+        match node:
+            case ast.Assign(targets=targets, value=value):
+                return self.assign(node, targets, value)
+            case ast.AnnAssign(target=target, value=ast.expr() as value):
+                return self.assign(node, [target], value)
+            case ast.AugAssign(target=target, op=op, value=value):
+                return self.augment(node, target, op, value)
+            case ast.Return(value=None):
+                return ["return;"]
+            case ast.Return(value=ast.expr() as value):
+                assert self.function.result is not None
+                return [f"return {self.text_as(value, self.function.result)};"]
+            case ast.Expr(value=value):
+                return [f"{self.text(value)};"]
+            case ast.If():
+                return self.branch(node)
+            case ast.While():
+                return [f"while ({self.guarded(self._condition_of, node)}) {{", *self.inner_block(node.body), "}"]
+            case ast.For(target=ast.Name(id=name), iter=iterated, body=body):
+                return self.loop(node, name, iterated, body)
+            case ast.Break():
+                return ["break;"]
+            case ast.Continue():
+                return ["continue;"]
+        raise self.function.refuse(node)
+
+    def branch(self, node: ast.If) -> list[str]:
+        """Return the lines of an if statement."""
+        lines = [f"if ({self._condition_of(node)}) {{", *self.inner_block(node.body)]
+        others = node.orelse
+        while len(others) == 1 and isinstance(after := others[0], ast.If):
+            condition = self.guarded(self._condition_of, after)
+            lines += [f"}} else if ({condition}) {{  // {describe_statement(after, 'elif')}"]
+            lines += self.inner_block(after.body)
+            others = after.orelse
+        return [*lines, "} else {", *self.inner_block(others), "}"] if others else [*lines, "}"]
+
+    def _condition_of(self, node: ast.If | ast.While) -> str:
+        return self.condition(node.test).text
+
+    # ------------------------------------------------------------------------------------------------- loops
+    def loop(self, node: ast.For, name: str, iterated: ast.expr, body: Sequence[ast.stmt]) -> list[str]:
+        """Return the lines of a for statement.
+
+        As in Python, what the body stores in the variable of the loop makes no difference to the next round.
+        """
+        is_own = name == "_" or name in self._places.loop_variables.get(node, ())
+        counter = self.new_name("index") if name == "_" or not is_own else self.local(name)
+        store = [] if is_own else [f"{INDENT}{self.local(name)} = {counter};"]
+        if self.function.is_range(iterated):
+            assert isinstance(iterated, ast.Call)
+            head = self._range_head(counter, iterated.args, iterated)
+        else:
+            assert isinstance(iterated, ast.Tuple)
+            kind = self._variable_type(name, iterated)
+            items = self.ordered(iterated.elts, self.text)
+            parts = [
+                self.cast(text, self.function.require_type(part), kind)
+                for text, part in zip(items, iterated.elts, strict=True)
+            ]
+            array = self.new_name("items")
+            type_name = self.names.name_type(kind)
+            self.pending.append(f"const {type_name} {array}[] = {{{', '.join(parts)}}};")
+            head = f"for (const {type_name} {counter} : {array})"
+        return [f"{head} {{", *store, *self.inner_block(body), "}"]
+
+    def _variable_type(self, name: str, iterated: ast.Tuple) -> Type:
+        kind = self.function.variables.get(name) if name != "_" else None
+        for part in iterated.elts:
+            kind = kind or self.function.require_type(part)
+        assert kind is not None
+        return kind
+
+    def _range_head(self, counter: str, bounds: Sequence[ast.expr], node: ast.expr) -> str:
+        texts = self.ordered(bounds, self.text)
+        first, stop, step = ["0", *texts, "1"] if len(texts) == 1 else [*texts, "1"][:3]
+        ends = ""
+        stop_node = bounds[0] if len(bounds) == 1 else bounds[1]
+        if self.function.constant_index(stop_node) is None:
+            end = self.new_name(f"{counter}_end")
+            ends, stop = f", {end} = {stop}", end
+        start = f"int64_t {counter} = {first}{ends}"
+        if len(texts) < 3:
+            return f"for ({start}; {counter} < {stop}; ++{counter})"
+        constant = self.function.constant_index(bounds[2])
+        if constant is None:
+            held = self.new_name(f"{counter}_step")
+            return (
+                f"for ({start}, {held} = {step}; {held} > 0 ? {counter} < {stop} : {counter} > {stop}; "
+                f"{counter} += {held})"
+            )
+        if constant == 0:
+            raise self.function.refuse(node, "the step is 0")
+        sign = "<" if constant > 0 else ">"
+        return f"for ({start}; {counter} {sign} {stop}; {counter} += {write_number(constant)})"
+
+    # ------------------------------------------------------------------------------------------- assignments
+    def assign(self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.expr) -> list[str]:
+        """Return the lines of an assignment to one target or several."""
+        kind = self.function.require_type(value)
+        if isinstance(kind, Callee):
+            return []
+        if len(targets) == 1 and not isinstance(targets[0], ast.Tuple):
+            return self._assign_one(node, targets[0], value, kind)
+        if isinstance(value, ast.Tuple) and self._are_separate(targets, value):
+            return self._assign_items(node, targets, value)
+        text = self.text(value)
+        held = text if is_number(kind) and isinstance(value, ast.Constant) else self.hold(kind, text)
+        lines = self._take_pending()
+        return lines + [line for target in targets for line in self.store(node, target, held, kind)]
+
+    @staticmethod
+    def _are_separate(targets: Sequence[ast.expr], value: ast.Tuple) -> bool:
+        """Return whether items are assigned to items, so that no tuple has to be made."""
+        return all(isinstance(target, ast.Tuple) for target in targets) and not any(
+            isinstance(part, ast.Starred) for part in value.elts
+        )
+
+    def _assign_one(self, node: ast.stmt, target: ast.expr, value: ast.expr, kind: Type) -> list[str]:
+        if isinstance(target, ast.Name):
+            own = self.function.variables.get(target.id)
+            if own is None:
+                return [f"{self.text(value)};"] if self.function.effects_of(value) & WRITES else []
+            return [f"{self._definition(node, target.id)}{self.local(target.id)} = {self.text_as(value, own)};"]
+        # C++17 evaluates what is assigned before the place that it is assigned to, as Python does.
+        text = self.text(value)
+        return [f"{self.text(target)} = {text};"]
+
+    def _assign_items(self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.Tuple) -> list[str]:
+        """Return the lines of a tuple assignment: all values are computed before the first is stored."""
+        first = targets[0]
+        assert isinstance(first, ast.Tuple)
+        stored = {part.id for part in first.elts if isinstance(part, ast.Name)}
+        lines: list[str] = []
+        if len(targets) == 1 and self._is_independent(first, value, stored):
+            for target, part in zip(first.elts, value.elts, strict=True):
+                own = self._assign_one(node, target, part, self.function.require_type(part))
+                lines += [*self._take_pending(), *own]
+            return lines
+        held = []
+        for part in value.elts:
+            text = self.text(part)
+            held.append(text if isinstance(part, ast.Constant) else self.hold(self.function.require_type(part), text))
+            lines += self._take_pending()
+        for target in targets:
+            assert isinstance(target, ast.Tuple)
+            for target_part, text, part in zip(target.elts, held, value.elts, strict=True):
+                lines += self.store(node, target_part, text, self.function.require_type(part))
+        return lines
+
+    def _is_independent(self, target: ast.Tuple, value: ast.Tuple, stored: set[str]) -> bool:
+        """Return whether each value may be stored as soon as it is computed."""
+        if not all(isinstance(part, ast.Name) and part.id != "_" for part in target.elts):
+            return False
+        used = {node.id for node in ast.walk(value) if isinstance(node, ast.Name)}
+        return len(stored) == len(target.elts) and not used & stored
+
+    def store(self, node: ast.stmt, target: ast.expr, text: str, kind: Type) -> list[str]:
+        """Return the lines that store a value in a target.
+
+        Args:
+            node: the assignment.
+            target: variable, item of a vector, or tuple of these.
+            text: the value, which costs nothing to evaluate again.
+            kind: its type.
+        """
+        if isinstance(kind, Callee):
+            return []
+        match target:
+            case ast.Name(id="_"):
+                return []
+            case ast.Name(id=name):
+                own = self.function.variables[name]
+                assert own is not None
+                return [f"{self._definition(node, name)}{self.local(name)} = {self.convert(text, kind, own)};"]
+            case ast.Tuple(elts=parts):
+                assert isinstance(kind, Tuple)
+                lines = []
+                for index, part in enumerate(parts):
+                    lines += self.store(node, part, self.item(text, kind, index), kind.parts[index])
+                return lines
+        line = f"{self.text(target)} = {text};"
+        return [*self._take_pending(), line]
+
+    def _definition(self, node: ast.stmt, name: str) -> str:
+        """Return what stands before a variable where it is defined, which is nothing elsewhere."""
+        if self._places.definitions.get(name) is not node:
+            return ""
+        kind = self.function.variables[name]
+        assert kind is not None
+        constant = "const " if name in self._places.constants and not isinstance(kind, Pointer) else ""
+        return f"{constant}{self.names.name_type(kind)} "
+
+    def augment(self, node: ast.AugAssign, target: ast.expr, op: ast.operator, value: ast.expr) -> list[str]:
+        """Return the lines of an augmented assignment."""
+        kinds = [self.function.require_type(to_load(target)), self.function.require_type(value)]
+        is_written = bool(self.function.effects_of(value) & WRITES)
+        if isinstance(target, ast.Subscript):
+            place = f"{self.text(target.value)}[{self._store_index(target.slice, is_written)}]"
+        else:
+            place = self.text(target)
+        before = self.hold(kinds[0], place) if is_written and isinstance(target, ast.Subscript) else place
+        is_direct = type(op) in OPERATORS and not (isinstance(op, ast.Div) and all(map(is_integral, kinds)))
+        if is_direct and before == place:
+            return [f"{place} {OPERATORS[type(op)][0]}= {self.text(value)};"]
+        texts = [before, self._operand(value, op, is_right=True)]
+        return [f"{place} = {self.operation(texts, op, kinds, node).text};"]
+
+    def _store_index(self, node: ast.expr, is_written: bool) -> str:
+        text = self.text(node)
+        if self.function.effects_of(node) and is_written:
+            return self.hold(self.function.require_type(node), text)
+        return text
+
+
+class VariablePlaces:
+    """Where each variable of a function is defined: by the assignment to it, by its loop, or before everything.
+
+    Attributes:
+        definitions: the statement that defines a variable by its first assignment.
+        loop_variables: the variables that are defined by a loop.
+        outer: variables that are defined before the first statement.
+        constants: variables that only one statement stores.
+    """
+
+    def __init__(self, function: Kernel) -> None:
+        self.definitions: dict[str, ast.stmt] = {}
+        self.loop_variables: dict[ast.stmt, set[str]] = {}
+        self.outer: list[str] = []
+        self._names: dict[ast.AST, set[str]] = {}
+        stores: dict[str, int] = {}
+        for statement in function.body:
+            for node in ast.walk(statement):
+                if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                    stores[node.id] = stores.get(node.id, 0) + 1
+        self.constants = {name for name, count in stores.items() if count == 1}
+        self._place(function.body, [name for name in function.own if name != "_"])
+
+    def _find_used_names(self, node: ast.AST) -> set[str]:
+        """Return the names of all variables in a part of the function."""
+        if node not in self._names:
+            names = {node.id} if isinstance(node, ast.Name) else set()
+            self._names[node] = names.union(*map(self._find_used_names, ast.iter_child_nodes(node)))
+        return self._names[node]
+
+    def _place(self, body: Sequence[ast.stmt], names: Sequence[str]) -> None:
+        """Find the place of variables that are used in one block only."""
+        for name in names:
+            users = [statement for statement in body if name in self._find_used_names(statement)]
+            first = users[0]
+            if len(users) == 1 and self._place_within(first, name):
+                continue
+            if self._defines(first, name):
+                self.definitions[name] = first
+            else:
+                # It may keep its value from one round of a loop to the next, or from one branch to another.
+                self.outer.append(name)
+
+    def _place_within(self, node: ast.stmt, name: str) -> bool:
+        """Find the place of a variable that is used in one compound statement only."""
+        blocks = [
+            block for field in ("body", "orelse") for block in [getattr(node, field, None)] if isinstance(block, list)
+        ]
+        heads = [child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.stmt)]
+        if isinstance(node, ast.For) and isinstance(node.target, ast.Name) and node.target.id == name:
+            stored = {
+                part.id
+                for statement in node.body
+                for part in ast.walk(statement)
+                if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store)
+            }
+            if name in stored or name in self._find_used_names(node.iter):
+                return False
+            self.loop_variables.setdefault(node, set()).add(name)
+            return True
+        if any(name in self._find_used_names(head) for head in heads):
+            return False
+        users = [block for block in blocks if any(name in self._find_used_names(statement) for statement in block)]
+        if len(users) != 1:
+            return False
+        self._place(users[0], [name])
+        return True
+
+    def _defines(self, node: ast.stmt, name: str) -> bool:
+        """Return whether an assignment gives a variable its first value without asking for it."""
+        match node:
+            case ast.Assign(targets=targets, value=value):
+                pass
+            case ast.AnnAssign(target=target, value=ast.expr() as value):
+                targets = [target]
+            case _:
+                return False
+        parts = [part for target in targets for part in ast.walk(target)]
+        count = sum(isinstance(part, ast.Name) and part.id == name for part in parts)
+        return count == 1 and name not in self._find_used_names(value)
+
+
+@cache
+def place_variables(function: Function) -> VariablePlaces:
+    """Return where each variable of a function is defined."""
+    return VariablePlaces(Kernel(function, "C++"))
+
+
+@cache
+def describe_statement(node: ast.stmt, keyword: str = "") -> str:
+    """Return the Python of a statement in one line, of a compound one the head only.
+
+    Args:
+        node: the statement.
+        keyword: what stands for `if` in it; empty for what it is.
+    """
+    match node:
+        case ast.If(test=test):
+            text = f"{keyword or 'if'} {ast.unparse(test)}:"
+        case ast.While(test=test):
+            text = f"while {ast.unparse(test)}:"
+        case ast.For(target=target, iter=iterated):
+            text = f"for {ast.unparse(target)} in {ast.unparse(iterated)}:"
+        case _:
+            text = ast.unparse(node)
+    return " ".join(text.split())

@@ -1,0 +1,162 @@
+"""The Python that kernels and laws are written in: functions of floats, integers, vectors and tuples of these.
+
+A writer of another language starts from a `Kernel`, which has the text of one function and knows what the names in it
+stand for. It meets a few kinds of statements and expressions only; what else there is, is an error that names it.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import linecache
+from collections.abc import Callable
+from functools import cached_property
+from types import ModuleType
+from typing import Any, TypeVar
+
+from osimlite.errors import UnsupportedError
+from osimlite.mechanics.kernels.layout import Record
+
+Function = Callable[..., Any]
+
+
+class TranslationError(UnsupportedError, NotImplementedError):
+    """A kernel uses something of Python that a writer has no counterpart for."""
+
+
+class Kernel:
+    """One function as a writer sees it.
+
+    Args:
+        function: of ours.
+        language: that it is to become, for messages.
+
+    Attributes:
+        function: as given.
+        tree: of its text.
+        body: its statements without the docstring.
+        given: names of its arguments.
+    """
+
+    def __init__(self, function: Function, language: str) -> None:
+        tree = self.parse(function)
+        self.function, self.tree, self.language = function, tree, language
+        self.body = tree.body[1:] if ast.get_docstring(tree) else tree.body
+        self.given = [argument.arg for argument in tree.args.args]
+
+    def parse(self, function: Function) -> ast.FunctionDef:
+        """Return the tree of a function, which all kernels share that read it."""
+        return find_tree(function)
+
+    @cached_property
+    def own(self) -> list[str]:
+        """Names of its other variables, in the order of their first appearance."""
+        return [name for name in stored(self.tree) if name not in self.given]
+
+    @property
+    def name(self) -> str:
+        """Name of the function that is unique among all modules."""
+        return name_of(self.function)
+
+    def value(self, node: ast.expr) -> Any:
+        """Return what a global name, or an attribute of a record or module, stands for; None if nothing."""
+        if isinstance(node, ast.Attribute):
+            owner = self.value(node.value) if isinstance(node.value, ast.Name | ast.Attribute) else None
+            return getattr(owner, node.attr, None) if isinstance(owner, Record | ModuleType) else None
+        name = node.id if isinstance(node, ast.Name) else ""
+        scope = self.function.__globals__
+        return scope[name] if name in scope else getattr(builtins, name, None)
+
+    @property
+    def file(self) -> str:
+        """The file of its source."""
+        return self.function.__code__.co_filename
+
+    def line_of(self, node: ast.AST) -> int:
+        """Return the line of a part of the function in its file."""
+        return getattr(node, "lineno", self.tree.lineno)
+
+    def refuse(self, node: ast.AST, reason: str = "") -> TranslationError:
+        """Return the error for a part that the language has no counterpart for.
+
+        Args:
+            node: the part of the function.
+            reason: what is wrong with it, as a clause; empty if it is not supported at all.
+        """
+        text = " ".join(ast.unparse(node).split())
+        text = text if len(text) <= LONGEST_QUOTE else f"{text[:LONGEST_QUOTE]}..."
+        message = f"the function '{self.name}' cannot be written as {self.language}: {text}"
+        message += f" ({reason})" if reason else " is not supported"
+        return TranslationError(message, file=self.file, line=self.line_of(node))
+
+
+_parsed: dict[str, tuple[list[str], dict[tuple[int, str], ast.FunctionDef]]] = {}
+"""By file, its lines and the functions in it, by the line that they begin in and their name."""
+
+
+def find_tree(function: Function) -> ast.FunctionDef:
+    """Return the tree of a function from the file that it is in.
+
+    Raises:
+        OSError: there is no such file, or the function is not there any more.
+    """
+    file = function.__code__.co_filename
+    linecache.checkcache(file)
+    lines = linecache.getlines(file, function.__globals__)
+    if file not in _parsed or _parsed[file][0] is not lines:
+        trees = list_functions(ast.parse("".join(lines)))
+        starts = [min([tree.lineno, *(part.lineno for part in tree.decorator_list)]) for tree in trees]
+        found = {(start, tree.name): tree for start, tree in zip(starts, trees, strict=True)}
+        _parsed[file] = lines, found
+    key = function.__code__.co_firstlineno, function.__code__.co_name
+    if key not in _parsed[file][1]:
+        raise OSError(f"{file} has no function {key[1]} in line {key[0]}: it has changed, or its text is not kept")
+    return _parsed[file][1][key]
+
+
+def list_functions(tree: ast.AST) -> list[ast.FunctionDef]:
+    """Return the functions in a module, without looking into expressions as `ast.walk` does."""
+    result, pending = list[ast.FunctionDef](), [tree]
+    while pending:
+        node = pending.pop()
+        if isinstance(node, ast.FunctionDef):
+            result.append(node)
+        for part in ("body", "orelse", "handlers", "finalbody", "cases"):
+            inner = getattr(node, part, ())
+            pending += inner if isinstance(inner, list) else ()
+    return result
+
+
+Node = TypeVar("Node", bound=ast.AST)
+
+
+def copy_tree(node: Node) -> Node:
+    """Return a copy of a tree that shares what has no parts, such as operators.
+
+    It is made ten times as fast as by `copy.deepcopy`, which a small study would spend a tenth of its time in.
+    """
+    result = type(node).__new__(type(node))
+    state = vars(result)
+    for name, value in vars(node).items():
+        if isinstance(value, ast.AST):
+            state[name] = copy_tree(value) if value._fields else value
+        elif isinstance(value, list):
+            state[name] = [copy_tree(item) if isinstance(item, ast.AST) else item for item in value]
+        else:
+            state[name] = value
+    return result
+
+
+LONGEST_QUOTE = 100
+"""Characters of the code that an error message quotes."""
+
+
+def name_of(function: Function) -> str:
+    """Return a name of a function that is unique among all modules."""
+    return f"{function.__module__.rpartition('.')[2]}_{function.__name__}"
+
+
+def stored(*trees: ast.AST) -> list[str]:
+    """Return the names of the variables that some code assigns, each once."""
+    nodes = (node for tree in trees for node in ast.walk(tree))
+    return list(dict.fromkeys(n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)))

@@ -1,0 +1,74 @@
+"""The error of Simbody's angular acceleration of a CustomJoint, as `SimbodyAccelerationError` has it."""
+
+from __future__ import annotations
+
+from osimlite.mechanics.kernels.layout import MODEL, OPERATION, OPERATION_WORK, OUTCOME, WORK
+from osimlite.mechanics.kernels.motion import set_row
+from osimlite.mechanics.kernels.parts import operation_ints, operation_work
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.states import copy
+from osimlite.mechanics.laws.vectors import ZERO, along, cross, minus, times, vector
+
+SIGN, COORDINATES, TURNS = 0, 1, 3
+"""Of its integers: -1 if it is passed backwards, else 1; the degrees of freedom of the first two coordinates of the
+joint, and the operations that are the three turns, -1 for what does not move."""
+
+
+def place_drift(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
+    """Nothing moves."""
+    kept, frame = operation_work(model, data, operation), at(data, WORK.SCRATCH)
+    copy(12, frame, kept)
+    return OUTCOME.OK
+
+
+def move_drift(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
+    """Velocity and own acceleration in SCRATCH; what turns the joint forwards stays in the operation."""
+    own = at(model, operation_ints(model, operation)[OPERATION.ARGUMENTS])
+    kept, result, u = (
+        operation_work(model, data, operation),
+        at(data, WORK.SCRATCH),
+        at(y, model[MODEL.DOFS]),
+    )
+    arm, total = minus(vector(kept, OPERATION_WORK.POINT), vector(result, 0)), ZERO
+    for row in range(1, 3):
+        last = own[TURNS + row]
+        if last < 0:
+            continue
+        # What Simbody takes for the rates of the angles before this one turns its axis, and should not.
+        drift = ZERO
+        for turn in range(3):
+            number = own[TURNS + turn]
+            if number < 0:
+                continue
+            wrong = 0.0
+            for c in range(row):
+                freedom = own[COORDINATES + c]
+                if freedom >= 0:
+                    wrong += share(model, data, number, freedom) * u[freedom]
+            if turn < row:
+                wrong -= rate(model, data, u, number)
+            drift = along(drift, wrong, vector(operation_work(model, data, number), OPERATION_WORK.AXIS))
+        axis = vector(operation_work(model, data, last), OPERATION_WORK.AXIS)
+        total = along(total, -rate(model, data, u, last), cross(axis, drift))
+    kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE], kept[OPERATION_WORK.CURVATURE] = total
+    total = times(float(own[SIGN]), total)
+    set_row(result, ZERO, ZERO)
+    set_row(at(result, 6), cross(arm, total), total)
+    return OUTCOME.OK
+
+
+def rate(model: Ints, data: Floats, u: Floats, operation: int) -> float:
+    """Of the amount of an operation."""
+    freedom = operation_ints(model, operation)[OPERATION.DOF]
+    return u[freedom] if freedom >= 0 else operation_work(model, data, operation)[OPERATION_WORK.RATE]
+
+
+def share(model: Ints, data: Floats, operation: int, freedom: int) -> float:
+    """Derivative of the amount of an operation by a degree of freedom."""
+    j, total = operation_ints(model, operation), 0.0
+    if j[OPERATION.DOF] >= 0:
+        return 1.0 if j[OPERATION.DOF] == freedom else 0.0
+    for k in range(j[OPERATION.ARGUMENT_COUNT]):
+        if model[j[OPERATION.ARGUMENTS] + k] == freedom:
+            total += data[j[OPERATION.GRADIENT] + k]
+    return total

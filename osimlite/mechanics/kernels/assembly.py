@@ -1,0 +1,459 @@
+"""Assembly of poses: the pose nearest to a given one that fulfils the constraints, for many poses in one call.
+
+The search is that of :mod:`osimlite.mechanics.multibody.assembly`: a projection onto the constraints by Newton's method, then
+minimisation of half the sum of squared changes of the coordinates along the constraints (J. Nocedal, S. Wright,
+Numerical Optimization, 2006, chapter 15.3). The step is that of Newton's method without the curvature of the
+constraints while that converges quickly, else with it.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import NamedTuple
+
+from osimlite.mechanics.kernels.constrained_dynamics import bind
+from osimlite.mechanics.kernels.eigenvalues import diagonalize
+from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, OUTCOME, STAGE, WORK
+from osimlite.mechanics.kernels.least_squares import (
+    REDUNDANT,
+    ROUNDING,
+    cholesky,
+    factor_room,
+    factorise,
+    minimum_norm,
+    substitute,
+    write_null_space,
+)
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.projection import position_errors, rows_by_values
+from osimlite.mechanics.kernels.states import copy, is_finite
+
+# Integers: the head, then what each degree of freedom is, three arrays (n,), room for a list (n,) of those that are
+# free, and of each coupler the degree of freedom that depends on others and its equation.
+MOVES_LINKS = 0
+"""Offset of 1 if the equations need positions of links, 0 if they need coordinates only."""
+COUPLERS = 1
+"""Offset of the number of couplers."""
+ASSEMBLY_HEAD = 2
+"""Length of the head."""
+HELD = 0
+"""Array of FREED, HELD_BY_USER or HELD_AT_END."""
+COUNTED = 1
+"""Array of 1 where a change of the coordinate adds to the cost, else 0."""
+CLAMPED = 2
+"""Array of 1 where the coordinate has a range, else 0."""
+FREE = 3
+"""Workspace for the list of free degrees of freedom."""
+COUPLER_AT = 4
+"""Records of the couplers."""
+FREED = 0
+"""State of a degree of freedom that the search moves."""
+HELD_BY_USER = 1
+"""State of a degree of freedom that the caller fixed, such as a locked coordinate."""
+HELD_AT_END = 2
+"""State of a degree of freedom that the search fixed at an end of its range."""
+
+# Numbers: the tolerance of the equations, and the range of each degree of freedom.
+TOLERANCE = 0
+"""Offset of the tolerance of the equations (m or rad)."""
+RANGES = 1
+"""Offset of the ranges (n, 2) in m or rad."""
+
+ASSEMBLED = 0.0
+"""Status of a pose that fulfils the constraints."""
+APART = 1.0
+"""Status of a pose near which no pose fulfils the constraints."""
+
+MAX_STEPS = 100
+EASE = 100.0
+"""Factor by which coordinates that do not count move more easily."""
+LONGEST_STEP = 0.5
+"""Largest change of a coordinate in one step towards the constraints (m or rad)."""
+OUTSIDE = 1e-12
+"""How far a coordinate may be outside of its range (m or rad)."""
+EXACT = 1e-15
+"""Errors of equations below this are rounding (m or rad)."""
+SHORTEST_STEP = 1e-13
+"""A step shorter than this part of the largest coordinate, or of 1, ends the search."""
+TINY_STEP = 1e-6
+"""Below this length (m or rad) rounding hides whether a step leads down; it is taken as long as steps shrink."""
+FAST = 0.1
+"""Steps that shrink by less than this factor need the curvature of the constraints."""
+DIFFERENCE = 1e-6
+"""Length of the finite differences of the equations (m or rad)."""
+FLAT = 1e-7
+"""Curvature of the cost below which a direction counts as undetermined."""
+SAFE = 1e-6
+"""Least pivot of Cholesky's method above which no curvature is below `FLAT`."""
+
+
+class Assembly(NamedTuple):
+    """The mechanism with its work vectors, and the integers, numbers and work of the assembly."""
+
+    model: Ints
+    reals: Floats
+    data: Floats
+    y: Floats
+    f: Floats
+    p: Ints
+    c: Floats
+    w: Floats
+
+
+def assembly_work_size(count: int, size: int) -> int:
+    """Return the length of the work vector for `count` equations and `size` degrees of freedom."""
+    return 7 * size + 3 * count + 2 * count * size + factor_room(count, size) + count * count + 5 * size * size
+
+
+def assemble_poses(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, p: Ints, c: Floats, w: Floats, frames: Floats,
+    found: Floats, count: int,
+) -> int:  # fmt: skip
+    """Assemble poses, each independently of the others.
+
+    Args:
+        model: the mechanism, all of whose coordinates are degrees of freedom.
+        reals: its numbers.
+        data: its work.
+        y: room for a state.
+        f: room for its rates.
+        p: the integers of the assembly.
+        c: its numbers.
+        w: its work, see `assembly_work_size`.
+        frames: of each pose the time (s) and the values of all degrees of freedom (n,).
+        found: of each pose the values that fulfil the constraints (n,), and ASSEMBLED or APART.
+        count: of the poses.
+    """
+    a, size = Assembly(model, reals, data, y, f, p, c, w), model[MODEL.DOFS]
+    for k in range(2 * size):
+        y[k] = f[k] = 0.0
+    for number in range(count):
+        frame, to = at(frames, (1 + size) * number), at(found, (1 + size) * number)
+        data[WORK.TIME] = frame[0]
+        to[size] = ASSEMBLED if assemble_pose(a, at(frame, 1), to) else APART
+    return OUTCOME.OK
+
+
+def assemble_pose(a: Assembly, wanted: Floats, q: Floats) -> bool:
+    """Fill q with the nearest pose in which clamped coordinates are in their ranges; return whether there is one."""
+    size, held, ranges = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD), at(a.c, RANGES)
+    clamped, given = at(held, CLAMPED * size), a.w
+    for k in range(size):
+        given[k] = wanted[k]
+        if held[k] == HELD_AT_END:
+            held[k] = FREED
+    while True:
+        if not find_nearest(a, wanted, q):
+            return False
+        worst, most = -1, OUTSIDE
+        for k in range(size):
+            if clamped[k] > 0 and held[k] == FREED:
+                outside = max(ranges[2 * k] - q[k], q[k] - ranges[2 * k + 1])
+                if outside > most:
+                    worst, most = k, outside
+        if worst < 0:
+            return True
+        # Fix the coordinate that leaves its range furthest at the end of it; then the others may fit.
+        held[worst] = HELD_AT_END
+        given[worst] = min(max(q[worst], ranges[2 * worst]), ranges[2 * worst + 1])
+
+
+def find_nearest(a: Assembly, wanted: Floats, q: Floats) -> bool:
+    """Fill q with the nearest pose, whatever the ranges; return whether there is one."""
+    size, tolerance = a.model[MODEL.DOFS], a.c[TOLERANCE]
+    copy(size, a.w, q)
+    list_freed(a)
+    trial = at(a.w, 4 * size)
+    largest = evaluate_equations(a, q)
+    # OpenSim leaves such a pose as it is; its integrator takes the shortest way to the constraints.
+    is_assembled = largest <= tolerance
+    if not is_assembled:
+        follow_couplers(a, q)
+    if not restore_pose(a, q, is_assembled):
+        return False
+    if is_assembled:
+        return True
+    before, has_curvature, step = inf, False, at(a.w, size)
+    for _ in range(MAX_STEPS):
+        value = measure_change(a, wanted, q)
+        if value < tolerance * tolerance:
+            # Nothing that counts has moved.
+            return True
+        length = find_step(a, wanted, q, has_curvature)
+        if not has_curvature and length > FAST * before:
+            has_curvature = True
+            length = find_step(a, wanted, q, has_curvature)
+        furthest = 1.0
+        for k in range(size):
+            furthest = max(furthest, 1.0 + abs(q[k]))
+        if length < SHORTEST_STEP * furthest:
+            return True
+        is_tiny, part = length < TINY_STEP and length <= 0.5 * before, 1.0
+        while True:
+            for k in range(size):
+                trial[k] = q[k] + part * step[k]
+            if not restore_pose(a, trial, False):
+                return False
+            if is_tiny or measure_change(a, wanted, trial) < value:
+                break
+            part *= 0.5
+            if part < 1e-3:
+                break
+        if part < 1e-3:
+            # Nothing is nearer within rounding, or the step without the curvature led astray.
+            if has_curvature:
+                return True
+            has_curvature, before = True, inf
+        else:
+            copy(size, trial, q)
+            before = length if part == 1.0 else inf
+    return True
+
+
+def list_freed(a: Assembly) -> int:
+    """List the degrees of freedom that may change; return their count."""
+    size, held, count = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD), 0
+    free = at(held, FREE * size)
+    for k in range(size):
+        if held[k] == FREED:
+            free[count] = k
+            count += 1
+    return count
+
+
+def measure_change(a: Assembly, wanted: Floats, q: Floats) -> float:
+    """Return half the sum of the squared changes that count."""
+    size, total = a.model[MODEL.DOFS], 0.0
+    counted = at(a.p, ASSEMBLY_HEAD + COUNTED * size)
+    for k in range(size):
+        if counted[k] > 0:
+            total += (q[k] - wanted[k]) * (q[k] - wanted[k])
+    return 0.5 * total
+
+
+def evaluate_equations(a: Assembly, q: Floats) -> float:
+    """Find errors and rows of the equations of a pose; return the largest error, infinite if one is no number."""
+    model, size = a.model, a.model[MODEL.DOFS]
+    copy(size, q, a.y)
+    if a.p[MOVES_LINKS] > 0:
+        call(model[MODEL.LAWS], model, a.reals, a.data, a.y, a.f, STAGE.VELOCITY)
+    bind(model, a.reals, a.data, a.y, a.f)
+    count, errors = count_equations(a), at(a.w, 7 * size)
+    position_errors(model, a.data, errors)
+    rows_by_values(model, a.data, a.y, rows_of(a))
+    if not is_finite(count, errors):
+        return inf
+    largest = 0.0
+    for k in range(count):
+        largest = max(largest, abs(errors[k]))
+    return largest
+
+
+def count_equations(a: Assembly) -> int:
+    """Return how many equations bind positions."""
+    return a.model[a.model[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS]
+
+
+def rows_of(a: Assembly) -> Floats:
+    """Return where the derivatives of the errors by the coordinates (m, n) are."""
+    return at(a.w, 7 * a.model[MODEL.DOFS] + 3 * count_equations(a))
+
+
+def factor_of(a: Assembly) -> Floats:
+    """Return where the factor of the equations of the free coordinates is."""
+    return at(rows_of(a), count_equations(a) * a.model[MODEL.DOFS])
+
+
+def follow_couplers(a: Assembly, q: Floats) -> None:
+    """Let coordinates that depend on others and do not count start where the others want them."""
+    size, held = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD)
+    counted, couplers = at(held, COUNTED * size), at(held, COUPLER_AT * size)
+    start = a.model[MODEL.CONSTRAINED]
+    for k in range(a.p[COUPLERS]):
+        dependent = couplers[2 * k]
+        if held[dependent] == FREED and counted[dependent] == 0:
+            evaluate_equations(a, q)
+            # The error of a coupler is its function less the coordinate.
+            q[dependent] += a.data[a.model[start + CONSTRAINED.WORK_ERRORS] + couplers[2 * k + 1]]
+
+
+def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
+    """Factorise the equations of the free coordinates, each with a left side of unit length; return their rank."""
+    size, count = a.model[MODEL.DOFS], count_equations(a)
+    held, rows, factor = at(a.p, ASSEMBLY_HEAD), rows_of(a), factor_of(a)
+    counted, places = at(held, COUNTED * size), at(held, FREE * size)
+    lengths, longest = at(a.w, 7 * size + count), 1.0
+    for i in range(count):
+        total = 0.0
+        for k in range(free):
+            entry = rows[size * i + places[k]]
+            if is_eased and counted[places[k]] == 0:
+                entry *= EASE
+            factor[free * i + k] = entry
+            total += entry * entry
+        lengths[i] = sqrt(total)
+        longest = max(longest, lengths[i])
+    for i in range(count):
+        if lengths[i] <= ROUNDING * longest:
+            lengths[i] = longest
+        for k in range(free):
+            factor[free * i + k] /= lengths[i]
+    return factorise(count, free, factor, REDUNDANT)
+
+
+def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
+    """Move q to where the equations hold, by Newton's method with the shortest steps; return whether they do."""
+    size, count, tolerance = a.model[MODEL.DOFS], count_equations(a), a.c[TOLERANCE]
+    held, errors, factor = at(a.p, ASSEMBLY_HEAD), at(a.w, 7 * size), factor_of(a)
+    counted, places = at(held, COUNTED * size), at(held, FREE * size)
+    step, trial, room = at(a.w, 2 * size), at(a.w, 3 * size), at(factor, factor_room(count, size))
+    lengths, values = at(errors, count), at(errors, 2 * count)
+    free, largest = list_freed(a), evaluate_equations(a, q)
+    for _ in range(MAX_STEPS):
+        if not largest < inf or largest <= EXACT:
+            break
+        rank = factorise_rows(a, free, not is_assembled)
+        for i in range(count):
+            values[i] = -errors[i] / lengths[i]
+        minimum_norm(count, free, factor, rank, values, room, step)
+        furthest = LONGEST_STEP
+        for k in range(free):
+            if not is_assembled and counted[places[k]] == 0:
+                step[k] *= EASE
+            furthest = max(furthest, abs(step[k]))
+        # Far from a solution the linearization is poor: take short steps, even where errors grow.
+        copy(size, q, trial)
+        for k in range(free):
+            trial[places[k]] += LONGEST_STEP / furthest * step[k]
+        new = evaluate_equations(a, trial)
+        if largest <= tolerance and not new < 0.5 * largest:
+            break
+        largest = new
+        copy(size, trial, q)
+    return largest <= tolerance
+
+
+def find_step(a: Assembly, wanted: Floats, q: Floats, has_curvature: bool) -> float:
+    """Find Newton's step in the null space of the linearized equations.
+
+    Args:
+        a: the assembly; its work vector gets the step of every degree of freedom (rad or m).
+        wanted: desired values of the coordinates (n,).
+        q: present values (n,).
+        has_curvature: whether the Hessian contains the equations times their multipliers, besides the cost.
+
+    Returns:
+        The largest change of a coordinate (rad or m).
+    """
+    size, count = a.model[MODEL.DOFS], count_equations(a)
+    held, factor, step = at(a.p, ASSEMBLY_HEAD), factor_of(a), at(a.w, size)
+    counted, places = at(held, COUNTED * size), at(held, FREE * size)
+    gradient, along = at(a.w, 5 * size), at(factor, factor_room(count, size) + count * size + count * count)
+    evaluate_equations(a, q)
+    free = list_freed(a)
+    rank = factorise_rows(a, free, False)
+    left = free - rank
+    curvature, spare = at(along, size * size), at(along, 2 * size * size)
+    for k in range(free):
+        gradient[k] = q[places[k]] - wanted[places[k]] if counted[places[k]] > 0 else 0.0
+    write_null_space(free, factor, rank, along)
+    for k in range(left):
+        for m in range(left):
+            total = 0.0
+            for j in range(free):
+                if counted[places[j]] > 0:
+                    total += along[free * k + j] * along[free * m + j]
+            curvature[left * k + m] = total
+    if has_curvature:
+        add_curvature(a, q, free, left, along, curvature)
+    # The negative gradient in the null space, replaced by the solution of the linear system.
+    lengths = at(a.w, 6 * size)
+    for k in range(left):
+        lengths[k] = 0.0
+        for j in range(free):
+            lengths[k] -= along[free * k + j] * gradient[j]
+    copy(left * left, curvature, spare)
+    is_convex = cholesky(left, spare, 0.0)
+    for k in range(left):
+        is_convex = is_convex and spare[left * k + k] * spare[left * k + k] > SAFE
+    if is_convex:
+        substitute(left, spare, lengths)
+    else:
+        step_downhill(left, curvature, spare, at(spare, size * size), lengths)
+    for k in range(size):
+        step[k] = 0.0
+    largest = 0.0
+    for j in range(free):
+        total = 0.0
+        for k in range(left):
+            total += along[free * k + j] * lengths[k]
+        step[places[j]] = total
+        largest = max(largest, abs(total))
+    return largest
+
+
+def add_curvature(a: Assembly, q: Floats, free: int, left: int, along: Floats, curvature: Floats) -> None:
+    """Add the second derivatives of the equations times their multipliers, by central differences."""
+    size, count = a.model[MODEL.DOFS], count_equations(a)
+    factor, gradient = factor_of(a), at(a.w, 5 * size)
+    rows, lengths, multipliers = rows_of(a), at(a.w, 7 * size + count), at(a.w, 7 * size + 2 * count)
+    places, trial = at(a.p, ASSEMBLY_HEAD + FREE * size), at(a.w, 3 * size)
+    unit = at(factor, factor_room(count, size))
+    normal, bent = at(unit, count * size), at(along, 2 * size * size)
+    for i in range(count):
+        multipliers[i] = 0.0
+        for k in range(free):
+            unit[free * i + k] = rows[size * i + places[k]] / lengths[i]
+            multipliers[i] -= unit[free * i + k] * gradient[k]
+    for i in range(count):
+        for j in range(count):
+            total = 1e-12 if i == j else 0.0
+            for k in range(free):
+                total += unit[free * i + k] * unit[free * j + k]
+            normal[count * i + j] = total
+    if not cholesky(count, normal, 0.0):
+        return
+    substitute(count, normal, multipliers)
+    for i in range(count):
+        multipliers[i] /= lengths[i]
+    for k in range(left):
+        for j in range(free):
+            bent[j] = 0.0
+        for side in range(2):
+            change = DIFFERENCE if side == 0 else -DIFFERENCE
+            copy(size, q, trial)
+            for j in range(free):
+                trial[places[j]] += change * along[free * k + j]
+            evaluate_equations(a, trial)
+            for j in range(free):
+                for i in range(count):
+                    bent[j] += multipliers[i] * rows[size * i + places[j]] / (2.0 * change)
+        for m in range(left):
+            total = 0.0
+            for j in range(free):
+                total += along[free * m + j] * bent[j]
+            # Half of it on either side of the diagonal, so that rounding does not make it lopsided.
+            curvature[left * k + m] += 0.5 * total
+            curvature[left * m + k] += 0.5 * total
+
+
+def step_downhill(count: int, curvature: Floats, vectors: Floats, room: Floats, x: Floats) -> None:
+    """Solve for a step where the curvature is not positive: downhill where it is negative, none where it is flat.
+
+    Args:
+        count: of the unknowns.
+        curvature: symmetric (count, count); destroyed.
+        vectors: room for as many numbers.
+        room: for count numbers.
+        x: the slopes downwards, then the step.
+    """
+    diagonalize(count, curvature, vectors)
+    for k in range(count):
+        total, value = 0.0, abs(curvature[count * k + k])
+        for j in range(count):
+            total += vectors[count * k + j] * x[j]
+        room[k] = 0.0 if value < FLAT else total / value
+    for j in range(count):
+        x[j] = 0.0
+        for k in range(count):
+            x[j] += vectors[count * k + j] * room[k]

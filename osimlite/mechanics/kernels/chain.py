@@ -1,0 +1,151 @@
+"""Accelerations from the mass matrix and the bias of another program, whose joints have one axis each.
+
+The joints follow the coordinates; with the generalized speeds u their rates are J u, and their accelerations
+J udot + b. So the equations of motion of the coordinates are those of the joints, projected: the mass matrix is Jᵀ M J,
+and the bias is Jᵀ of the forces that the joints need at accelerations b. An entry of J that may differ from zero is a
+share.
+"""
+
+from __future__ import annotations
+
+from osimlite.mechanics.kernels.ball_joint import angle_drift, angle_row, last_axis
+from osimlite.mechanics.kernels.layout import (
+    CHAIN,
+    DOF,
+    EXCESS,
+    JOINT,
+    JOINT_KIND,
+    LINK_WORK,
+    MODEL,
+    OPERATION,
+    OPERATION_WORK,
+    OUTCOME,
+    PRODUCT,
+    SHARE,
+)
+from osimlite.mechanics.kernels.parts import link_work, operation_ints, operation_work
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.laws.vectors import ZERO, cross, dot, put, replaced, times, vector
+
+
+def chain_dynamics(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int) -> int:
+    """Mass matrix, and the bias taken off the generalized forces; f has the rates and these before."""
+    h, right = at(model, model[MODEL.CHAIN]), at(f, model[MODEL.DOFS])
+    move_joints(model, reals, data, y, f)
+    status = call(h[CHAIN.SUPPLY], model, reals, data, y, f, 0)
+    if status != OUTCOME.OK:
+        return status
+    forces, shares = at(data, h[CHAIN.WORK_JOINTS] + 3 * h[CHAIN.JOINTS]), at(data, h[CHAIN.WORK_SHARES])
+    matrix = at(forces, h[CHAIN.JOINTS])
+    for k in range(h[CHAIN.SHARES]):
+        share = at(model, h[CHAIN.SHARE_AT] + SHARE.SIZE * k)
+        joint, freedom = share[SHARE.JOINT], share[SHARE.DOF]
+        if freedom >= 0:
+            right[freedom] -= shares[k] * forces[joint]
+    for k in range(h[CHAIN.ENTRY_AT], h[CHAIN.END_ENTRY]):
+        data[k] = 0.0
+    for k in range(h[CHAIN.PRODUCTS]):
+        product = at(model, h[CHAIN.PRODUCT_AT] + PRODUCT.SIZE * k)
+        data[product[PRODUCT.PLACE]] += (
+            shares[product[PRODUCT.ONE]] * shares[product[PRODUCT.TWO]] * matrix[product[PRODUCT.ENTRY]]
+        )
+    for k in range(h[CHAIN.EXCESSES]):
+        excess = at(model, h[CHAIN.EXCESS_AT] + EXCESS.SIZE * k)
+        take_off(
+            model,
+            data,
+            reals[excess[EXCESS.NUMBER]],
+            excess[EXCESS.DOF],
+            at(link_work(model, data, excess[EXCESS.LINK]), LINK_WORK.ACCELERATION),
+            right,
+        )
+    return OUTCOME.OK
+
+
+def take_off(model: Ints, data: Floats, moment: float, freedom: int, acceleration: Floats, right: Floats) -> None:
+    """Take an inertia off that is the same about every axis, so that no speed alone makes it resist.
+
+    Args:
+        model: the mechanism.
+        data: what is known of it.
+        moment: the inertia.
+        freedom: the last one on the way from ground to the link that has it.
+        acceleration: of the link without udot.
+        right: the generalized forces.
+    """
+    freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
+    while freedom >= 0:
+        a, row, other, place = at(columns, 6 * freedom), at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
+        right[freedom] += moment * (a[0] * acceleration[0] + a[1] * acceleration[1] + a[2] * acceleration[2])
+        while other >= 0:
+            b = at(columns, 6 * other)
+            row[place] -= moment * (a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+            other = freedoms[DOF.SIZE * other + DOF.ABOVE]
+            place += 1
+        freedom = freedoms[DOF.SIZE * freedom + DOF.ABOVE]
+
+
+def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None:
+    """Values, rates, and accelerations without udot of all joints, and the shares; f has the rates of coordinates."""
+    h = at(model, model[MODEL.CHAIN])
+    count = h[CHAIN.JOINTS]
+    for number in range(count):
+        joint, moves = at(model, h[CHAIN.JOINT_AT] + JOINT.SIZE * number), at(data, h[CHAIN.WORK_JOINTS] + number)
+        kind, source, part, shares = (
+            joint[JOINT.KIND],
+            joint[JOINT.SOURCE],
+            joint[JOINT.PART],
+            at(data, h[CHAIN.WORK_SHARES] + joint[JOINT.FIRST_SHARE]),
+        )
+        if kind == JOINT_KIND.LINE:
+            factor = reals[part]
+            shares[0] = factor
+            moves[0], moves[count], moves[2 * count] = factor * y[source], factor * f[source], 0.0
+            continue
+        j = operation_ints(model, source)
+        a = operation_work(model, data, source)
+        if kind == JOINT_KIND.AMOUNT_OF:
+            for k in range(j[OPERATION.ARGUMENT_COUNT]):
+                shares[k] = data[j[OPERATION.GRADIENT] + k]
+            moves[0], moves[count], moves[2 * count] = (
+                a[OPERATION_WORK.AMOUNT],
+                a[OPERATION_WORK.RATE],
+                a[OPERATION_WORK.CURVATURE],
+            )
+        elif kind == JOINT_KIND.ANGLE:
+            angles = at(model, j[OPERATION.ARGUMENTS])
+            moves[0], moves[count] = y[angles[part]], f[angles[part]]
+            moves[2 * count] = move_angle(angles, y, f, part, shares)
+        elif kind == JOINT_KIND.ELLIPSOID:
+            moves[0], moves[count], moves[2 * count] = move_end(
+                at(model, j[OPERATION.ARGUMENTS]),
+                y,
+                at(y, model[MODEL.DOFS]),
+                part,
+                reals[j[OPERATION.EXTRA] + part],
+                shares,
+            )
+        else:
+            # The joint stands still, and accelerates all the same.
+            turn = at(a, OPERATION_WORK.AXIS + part)
+            moves[0] = moves[count] = 0.0
+            moves[2 * count] = (
+                turn[0] * a[OPERATION_WORK.AMOUNT]
+                + turn[3] * a[OPERATION_WORK.RATE]
+                + turn[6] * a[OPERATION_WORK.CURVATURE]
+            )
+
+
+def move_angle(angles: Ints, y: Floats, f: Floats, part: int, row: Floats) -> float:
+    """Acceleration of one angle of a ball without udot; fills its row."""
+    put(row, 0, angle_row(y, angles, part))
+    return angle_drift(y, f, angles, vector(row, 0))
+
+
+def move_end(angles: Ints, y: Floats, u: Floats, part: int, radius: float, row: Floats) -> tuple[float, float, float]:
+    """Value, rate and acceleration without udot of a component of r n, n the last axis of a ball; fills its row."""
+    n, spin = last_axis(y, angles), (u[angles[0]], u[angles[1]], u[angles[2]])
+    # n moves by u x n, and that by u x (u x n).
+    put(row, 0, times(radius, cross(n, replaced(ZERO, part, 1.0))))
+    own = spin[part] * dot(spin, n) - n[part] * dot(spin, spin)
+    return radius * n[part], dot(vector(row, 0), spin), radius * own

@@ -1,0 +1,93 @@
+"""Where the end of a rod is that bends evenly; see :class:`osimlite.mechanics.multibody.arc.ArcPoint`."""
+
+from __future__ import annotations
+
+from math import acos, cos, sin
+
+from osimlite.mechanics.kernels.layout import MODEL, OPERATION, OPERATION_WORK, OUTCOME
+from osimlite.mechanics.kernels.parts import operation_ints, operation_work
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+
+COMPONENT, LENGTH, NEUTRAL, TERMS, SERIES = 2, 3, 4, 6, 7
+"""Of the table: the component, the length, the two angles where the arguments are zero, the number of terms of each
+series by the square of the angle, and the terms of (sin θ) / θ and (1 - cos θ) / θ²."""
+
+
+def amount_by_arc(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int) -> int:
+    """Amount of an operation by the bending of a rod in two angles, with its derivatives."""
+    j, kept = (
+        operation_ints(model, operation),
+        operation_work(model, data, operation),
+    )
+    one, two, p = model[j[OPERATION.ARGUMENTS]], model[j[OPERATION.ARGUMENTS] + 1], at(reals, j[OPERATION.EXTRA])
+    table, u = at(p, 2), at(y, model[MODEL.DOFS])
+    a = (y[one] if one >= 0 else p[0]) + table[NEUTRAL]
+    b = (y[two] if two >= 0 else p[1]) + table[NEUTRAL + 1]
+    ua, ub = u[one] if one >= 0 else 0.0, u[two] if two >= 0 else 0.0
+    value, da, db, daa, dab, dbb = arc_at(table, a, b)
+    data[j[OPERATION.GRADIENT]], data[j[OPERATION.GRADIENT] + 1] = da, db
+    kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE] = value, da * ua + db * ub
+    kept[OPERATION_WORK.CURVATURE] = daa * ua * ua + 2.0 * dab * ua * ub + dbb * ub * ub
+    return OUTCOME.OK
+
+
+def arc_at(table: Floats, a: float, b: float) -> tuple[float, float, float, float, float, float]:
+    """Value, derivatives, and second derivatives by a, a; a, b; b, b of a component of the end, at its two angles."""
+    sa, ca, sb, cb = sin(a), cos(a), sin(b), cos(b)
+    # The cosine of the whole angle, with its derivatives by the two.
+    c, ga, gb, haa, hab, hbb = ca * cb, -sa * cb, -ca * sb, -ca * cb, sa * sb, -ca * cb
+    component = int(table[COMPONENT])
+    share, first, second = along_the_arc(table, c) if component == 1 else across_the_arc(table, c)
+    oaa, oab, obb = first * haa + second * ga * ga, first * hab + second * ga * gb, first * hbb + second * gb * gb
+    oa, ob = first * ga, first * gb
+    # Times the direction in which it bends.
+    v, va, vb, vaa, vab, vbb = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if component == 0:
+        v, vb, vbb = -sb, -cb, sb
+    elif component == 2:
+        v, va, vb, vaa, vab, vbb = sa * cb, ca * cb, -sa * sb, -sa * cb, -ca * sb, -sa * cb
+    size = table[1] * table[LENGTH]
+    da, db = size * (v * oa + share * va), size * (v * ob + share * vb)
+    daa = size * (v * oaa + share * vaa + 2.0 * va * oa)
+    dab = size * (v * oab + share * vab + va * ob + vb * oa)
+    dbb = size * (v * obb + share * vbb + 2.0 * vb * ob)
+    return size * v * share, da, db, daa, dab, dbb
+
+
+def along_the_arc(table: Floats, cosine: float) -> tuple[float, float, float]:
+    """Value and two derivatives by cos θ of (sin θ) / θ."""
+    square = angle_squared(cosine)
+    h, h1, h2 = series(at(table, SERIES), int(table[TERMS]), square)
+    return by_cosine(h, h1, h2, h, h1)
+
+
+def across_the_arc(table: Floats, cosine: float) -> tuple[float, float, float]:
+    """Value and two derivatives by cos θ of (1 - cos θ) / (θ sin θ)."""
+    square, count = angle_squared(cosine), int(table[TERMS])
+    h, h1, h2 = series(at(table, SERIES), count, square)
+    m, m1, m2 = series(at(table, SERIES + count), count, square)
+    k, k1 = 1.0 / h, -h1 / (h * h)
+    k2 = 2.0 * h1 * h1 / (h * h * h) - h2 / (h * h)
+    return by_cosine(m * k, m1 * k + m * k1, m2 * k + 2.0 * m1 * k1 + m * k2, h, h1)
+
+
+def angle_squared(cosine: float) -> float:
+    """The square of an angle by its cosine."""
+    angle = acos(max(-1.0, min(1.0, cosine)))
+    return angle * angle
+
+
+def series(terms: Floats, count: int, square: float) -> tuple[float, float, float]:
+    """Value and two derivatives of a polynomial."""
+    value = slope = bend = 0.0
+    for k in range(count - 1, -1, -1):
+        bend = bend * square + slope
+        slope = slope * square + value
+        value = value * square + terms[k]
+    return value, slope, 2.0 * bend
+
+
+def by_cosine(value: float, first: float, second: float, h: float, h1: float) -> tuple[float, float, float]:
+    """From derivatives by θ² to derivatives by cos θ, whose rate is -sin θ / (2 θ)."""
+    rate, rate1 = -2.0 / h, 2.0 * h1 / (h * h)
+    return value, rate * first, rate * (rate1 * first + rate * second)

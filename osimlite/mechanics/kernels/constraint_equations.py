@@ -1,0 +1,218 @@
+"""Constraints as equations: rows of the matrix G, errors of the positions, and what G u and G udot are to be.
+
+Each law here fills in the equations of one constraint, after the velocities of the links are known. Those between
+bodies are made of two kinds of vectors: an axis fixed in a link, and an arm from a point of one link to one of another.
+What a unit of a vector's rate takes of the speeds is what a force along it would do to their coordinates.
+"""
+
+from __future__ import annotations
+
+from osimlite.mechanics.kernels.ball_joint import angle_drift, angle_row
+from osimlite.mechanics.kernels.functions import MONOMIALS, several_at, value_at
+from osimlite.mechanics.kernels.layout import (
+    CONSTRAINED,
+    CONSTRAINT,
+    COORDINATE,
+    DOF,
+    LINK,
+    LINK_WORK,
+    MODEL,
+    OUTCOME,
+    WORK,
+)
+from osimlite.mechanics.kernels.parts import link_ints, link_work
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.points import (
+    acceleration,
+    angular_acceleration_bias,
+    angular_velocity,
+    direction,
+    station,
+    velocity,
+)
+from osimlite.mechanics.laws.vectors import (
+    ZERO,
+    Vector,
+    cross,
+    dot,
+    minus,
+    norm,
+    over,
+    plus,
+    times,
+    vector,
+)
+
+AXIS, ARM, MEETING = 0, 1, 2
+"""Kinds of vectors; that of a meeting is an arm whose rate is how fast its end leaves the point of its first link that
+is there."""
+PRODUCT, DISTANCE, SLIP = 0, 1, 2
+"""Kinds of equations between bodies: the product of two vectors has a certain value; the second has a certain length;
+the end of the second is a roller whose point at its start moves along with that, as far as the first tells."""
+VECTOR_INTS, EQUATION_INTS, EQUATION_NUMBERS = 3, 7, 13
+"""Of a vector its kind and two links (an axis has the first); of an equation its kind and two vectors; and for each
+vector six numbers, of an axis or two points in their links, and the wanted value."""
+
+
+def prescribe(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, constraint: int) -> int:
+    """A coordinate follows a function of time, whose table is all its numbers."""
+    i, h = at(model, constraint), at(model, model[MODEL.CONSTRAINED])
+    row, own = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
+    value, slope, curvature = value_at(at(reals, i[CONSTRAINT.NUMBERS]), data[WORK.TIME])
+    data[h[CONSTRAINED.WORK_ERRORS] + row] = y[own[0]] - value
+    data[h[CONSTRAINED.WORK_RATES] + row] = slope
+    bias = add_coordinate(model, y, f, own, 1.0, at(data, h[CONSTRAINED.WORK_ROWS] + model[MODEL.DOFS] * row))
+    data[h[CONSTRAINED.WORK_DRIFTS] + row] = curvature - bias
+    return OUTCOME.OK
+
+
+def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, constraint: int) -> int:
+    """A coordinate is a function of others.
+
+    Its integers are the dependent coordinate, the place of room for the gradient, the count of the others, their
+    degrees of freedom, and each coordinate again in full; its numbers the values of coordinates at rest, the dependent
+    one first, and the table of the function.
+    """
+    i, h, p = (
+        at(model, constraint),
+        at(model, model[MODEL.CONSTRAINED]),
+        at(reals, model[constraint + CONSTRAINT.NUMBERS]),
+    )
+    row, own = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
+    size, freedoms = own[COORDINATE.SIZE + 1], at(own, COORDINATE.SIZE + 2)
+    others, gradient, constants = at(freedoms, size), at(data, own[COORDINATE.SIZE]), at(p, 1)
+    if int(constants[size]) >= MONOMIALS:
+        value, _, curvature = several_at(size, freedoms, constants, y, f, gradient)
+    else:
+        argument = rate = 0.0
+        if size > 0:
+            argument = y[freedoms[0]] if freedoms[0] >= 0 else constants[0]
+            rate = f[freedoms[0]] if freedoms[0] >= 0 else 0.0
+        value, slope, bend = value_at(at(constants, size), argument)
+        curvature = bend * rate * rate
+        gradient[0] = slope
+    to = at(data, h[CONSTRAINED.WORK_ROWS] + model[MODEL.DOFS] * row)
+    bias = add_coordinate(model, y, f, own, -1.0, to)
+    for k in range(size):
+        bias += add_coordinate(model, y, f, at(others, COORDINATE.SIZE * k), gradient[k], to)
+    data[h[CONSTRAINED.WORK_ERRORS] + row] = value - (y[own[0]] if own[0] >= 0 else p[0])
+    data[h[CONSTRAINED.WORK_DRIFTS] + row] = -bias - curvature
+    return OUTCOME.OK
+
+
+def add_coordinate(model: Ints, y: Floats, f: Floats, coordinate: Ints, factor: float, row: Floats) -> float:
+    """Add a multiple of the rate of a coordinate to a row; returns that of what it changes by while no speed does."""
+    freedom, ball = coordinate[COORDINATE.DOF], coordinate[COORDINATE.BALL]
+    if freedom < 0:
+        return 0.0
+    if ball < 0:
+        row[freedom] += factor
+        return 0.0
+    angles = at(model, ball)
+    n = angle_row(y, angles, coordinate[COORDINATE.PART])
+    one, two, three = n
+    row[angles[0]] += factor * one
+    row[angles[1]] += factor * two
+    row[angles[2]] += factor * three
+    return factor * angle_drift(y, f, angles, n)
+
+
+def bind_bodies(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, constraint: int) -> int:
+    """Some equations between bodies; its integers and numbers are theirs."""
+    i, h = at(model, constraint), at(model, model[MODEL.CONSTRAINED])
+    first, size = i[CONSTRAINT.FIRST_EQUATION], model[MODEL.DOFS]
+    for row in range(first, i[CONSTRAINT.END_EQUATION]):
+        own, p = (
+            at(i, CONSTRAINT.OWN + EQUATION_INTS * (row - first)),
+            at(reals, i[CONSTRAINT.NUMBERS] + EQUATION_NUMBERS * (row - first)),
+        )
+        one, two, wanted = at(own, 1), at(own, 1 + VECTOR_INTS), p[12]
+        to = at(data, h[CONSTRAINED.WORK_ROWS] + size * row)
+        a, a_rate, a_bias = follow(model, reals, data, one, p)
+        b, b_rate, b_bias = follow(model, reals, data, two, at(p, 6))
+        error = drift = 0.0
+        if own[0] == PRODUCT:
+            error = dot(a, b) - wanted
+            drift = dot(a, b_bias) + dot(b, a_bias) + 2.0 * dot(a_rate, b_rate)
+            lean(model, data, one, p, b, to)
+            lean(model, data, two, at(p, 6), a, to)
+        elif own[0] == DISTANCE:
+            length = norm(b)
+            error = length - wanted
+            # No direction is better than another to leave a point in.
+            e, stretch = (1.0, 0.0, 0.0), 0.0
+            if length > 0.0:
+                e = over(b, length)
+                stretch = (dot(b_rate, b_rate) - dot(e, b_rate) ** 2) / length
+            drift = dot(e, b_bias) + stretch
+            lean(model, data, two, at(p, 6), e, to)
+        else:
+            surface, roller, point = two[1], two[2], station(model, data, two[1], vector(p, 6))
+            add_force(model, data, surface, point, times(-1.0, a), to)
+            add_force(model, data, roller, point, a, to)
+            turning, turning_bias = (
+                angular_velocity(model, data, roller),
+                angular_acceleration_bias(model, data, roller),
+            )
+            drift = dot(a_rate, minus(b_rate, cross(turning, b)))
+            drift += dot(a, minus(minus(b_bias, cross(turning_bias, b)), cross(turning, b_rate)))
+        data[h[CONSTRAINED.WORK_ERRORS] + row], data[h[CONSTRAINED.WORK_DRIFTS] + row] = error, -drift
+    return OUTCOME.OK
+
+
+def follow(model: Ints, reals: Floats, data: Floats, kind: Ints, p: Floats) -> tuple[Vector, Vector, Vector]:
+    """A vector, its rate, and its second derivative while no speed changes."""
+    one, two = kind[1], kind[2]
+    if kind[0] == AXIS:
+        axis, turning = direction(model, data, one, vector(p, 0)), angular_velocity(model, data, one)
+        rate = cross(turning, axis)
+        return axis, rate, plus(cross(angular_acceleration_bias(model, data, one), axis), cross(turning, rate))
+    start, end = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 3))
+    arm = minus(end, start)
+    if kind[0] == MEETING:
+        start = end
+    rate = minus(velocity(model, data, two, end), velocity(model, data, one, start))
+    bias = minus(acceleration(model, reals, data, two, end), acceleration(model, reals, data, one, start))
+    if kind[0] == MEETING:
+        # As what carries both sees it.
+        while one != two:
+            if one > two:
+                one = link_ints(model, one)[LINK.PARENT]
+            else:
+                two = link_ints(model, two)[LINK.PARENT]
+        bias = minus(bias, times(2.0, cross(angular_velocity(model, data, one), rate)))
+    return arm, rate, bias
+
+
+def lean(model: Ints, data: Floats, kind: Ints, p: Floats, on: Vector, row: Floats) -> None:
+    """Add to a row what the speeds do to a vector along a direction."""
+    one, two = kind[1], kind[2]
+    if kind[0] == AXIS:
+        add_wrench(model, data, one, cross(direction(model, data, one, vector(p, 0)), on), ZERO, row)
+        return
+    start, end = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 3))
+    if kind[0] == MEETING:
+        start = end
+    add_force(model, data, one, start, times(-1.0, on), row)
+    add_force(model, data, two, end, on, row)
+
+
+def add_force(model: Ints, data: Floats, link: int, point: Vector, force: Vector, row: Floats) -> None:
+    """Add what a force at a point of ground on a link does to the coordinates."""
+    if link >= 0:
+        arm = minus(point, vector(link_work(model, data, link), LINK_WORK.ORIGIN))
+        add_wrench(model, data, link, cross(arm, force), force, row)
+
+
+def add_wrench(model: Ints, data: Floats, link: int, torque: Vector, force: Vector, row: Floats) -> None:
+    """Add what a wrench about the origin of the spatial vectors does to the coordinates."""
+    # Welded bodies may be links of their own.
+    while link >= 0 and link_ints(model, link)[LINK.FIRST_DOF] == link_ints(model, link)[LINK.END_DOF]:
+        link = link_ints(model, link)[LINK.PARENT]
+    if link < 0:
+        return
+    freedom = link_ints(model, link)[LINK.END_DOF] - 1
+    while freedom >= 0:
+        column = model[MODEL.WORK_COLUMN] + 6 * freedom
+        row[freedom] += dot(torque, vector(data, column)) + dot(force, vector(data, column + 3))
+        freedom = model[model[MODEL.DOF_AT] + DOF.SIZE * freedom + DOF.ABOVE]

@@ -1,0 +1,137 @@
+"""Where paths along geodesics and cables run: each geodesic is shot anew, piece after piece."""
+
+from __future__ import annotations
+
+from osimlite.mechanics.kernels.cable_paths import (
+    AT,
+    ELEMENT_INTS,
+    ELEMENTS,
+    GEODESIC,
+    GROUND_END,
+    GROUND_START,
+    IN_GROUND,
+    IS_OBSTACLE,
+    KEPT,
+    SOLVER,
+    STATE,
+    TOUCHES,
+)
+from osimlite.mechanics.kernels.cable_paths import COUNT as CABLE_COUNT
+from osimlite.mechanics.kernels.cable_paths import SURFACE as CABLE_SURFACE
+from osimlite.mechanics.kernels.cable_surfaces import ALONG as ALONG_GEODESIC
+from osimlite.mechanics.kernels.cable_surfaces import (
+    ALONG_BENDS,
+    ARC,
+    END,
+    POINT,
+    START,
+    STEP,
+    shoot,
+)
+from osimlite.mechanics.kernels.geodesic_paths import (
+    CHAIN,
+    PLACES,
+    POSE_NUMBERS,
+    POSES,
+    SEARCH,
+    WRAP_INTS,
+)
+from osimlite.mechanics.kernels.geodesic_starts import SURFACE
+from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.kernels.path_wraps import in_ground, in_surface
+from osimlite.mechanics.kernels.paths import (
+    ALONG,
+    COUNT,
+    NODE_INTS,
+    NODE_WORK,
+    NODES_AT,
+    ORDER,
+    PLACE,
+    POINTS,
+    WRAPS,
+)
+from osimlite.mechanics.kernels.paths import SURFACE as SURFACE_LENGTH
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.wrap_curves import pieces
+from osimlite.mechanics.laws.vectors import Vector, dot, put, turned_back, vector
+
+
+def trace_geodesics(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """Write all corners of a path that was measured into f, in ground; returns how many there are."""
+    i, p, result = at(model, item), at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
+    points, wraps = i[POINTS], at(i, NODES_AT + NODE_INTS * (i[POINTS] + 2 * i[WRAPS]))
+    order, work = at(result, ORDER), at(result, ORDER + points + 2 * i[WRAPS])
+    slots = at(wraps, WRAP_INTS * i[WRAPS])
+    geodesic, room = at(result, slots[CHAIN] + GEODESIC), at(result, slots[SEARCH])
+    count = 0
+    for k in range(int(result[COUNT])):
+        number = int(order[k])
+        here = at(work, NODE_WORK * number)
+        put(f, 3 * count, vector(here, PLACE))
+        count += 1
+        wrap = (number - points) // 2
+        if number >= points and number == points + 2 * wrap:
+            surface, pose = (
+                at(p, wraps[WRAP_INTS * wrap + PLACES] + SURFACE),
+                at(result, slots[POSES] + POSE_NUMBERS * wrap),
+            )
+            point = in_surface(pose, vector(here, PLACE))
+            way = turned_back(pose, vector(work, NODE_WORK * int(order[k - 1]) + ALONG))
+            length = here[NODE_WORK + SURFACE_LENGTH]
+            count += trace_geodesic(surface, pose, point, way, length, geodesic, room, at(f, 3 * count))
+    return count
+
+
+def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """The same of a cable."""
+    i, p, result = at(model, item), at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
+    count = 0
+    for k in range(i[CABLE_COUNT]):
+        element = at(i, ELEMENTS + ELEMENT_INTS * k)
+        kept = at(result, element[KEPT])
+        if element[IS_OBSTACLE] == 0:
+            put(f, 3 * count, vector(kept, 0))
+            count += 1
+        elif kept[STATE] == TOUCHES:
+            geodesic = at(kept, GEODESIC)
+            point, way = vector(geodesic, START + POINT), vector(geodesic, START + ALONG_GEODESIC)
+            surface, pose, room = at(p, element[AT] + CABLE_SURFACE), at(kept, IN_GROUND), at(result, i[SOLVER])
+            put(f, 3 * count, vector(kept, GROUND_START + POINT))
+            count += 1
+            count += trace_geodesic(surface, pose, point, way, geodesic[ARC], geodesic, room, at(f, 3 * count))
+            put(f, 3 * count, vector(kept, GROUND_END + POINT))
+            count += 1
+    return count
+
+
+def trace_geodesic(
+    surface: Floats,
+    pose: Floats,
+    point: Vector,
+    way: Vector,
+    length: float,
+    geodesic: Floats,
+    room: Floats,
+    f: Floats,
+) -> int:
+    """Write points of a geodesic between its ends into f, in ground; returns how many.
+
+    Args:
+        surface: that it is on.
+        pose: of the surface in ground.
+        point: where it starts, in the surface.
+        way: in what direction, there.
+        length: how far it goes, m.
+        geodesic: room for one.
+        room: for the integration.
+        f: room for points.
+    """
+    geodesic[STEP] = 0.0
+    if not (dot(way, way) > 0.0 and shoot(surface, point, way, length, geodesic, room)):
+        return 0
+    bends = max(abs(geodesic[START + ALONG_BENDS]), abs(geodesic[END + ALONG_BENDS]))
+    count = pieces(bends * length)
+    for k in range(1, count):
+        shoot(surface, point, way, length * k / count, geodesic, room)
+        put(f, 3 * (k - 1), in_ground(pose, vector(geodesic, END + POINT)))
+    return count - 1

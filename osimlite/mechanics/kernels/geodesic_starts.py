@@ -1,0 +1,398 @@
+"""Where a path begins to bend around a surface, if it does: exact on cylinders and spheres, near enough on others.
+
+A straight piece of a path bends around a surface that it would go through. On which side is told by the quadrant of the
+surface, of all sides by where the way is shorter:
+
+- a cylinder with a side x or y: the path turns so that it lies on the active side, whatever angle that takes, and also
+  where it misses the cylinder but would pass behind it, whenever OpenSim bends it;
+- a sphere or an ellipsoid with a side: a line through it is bent to where it is least deep in the surface; if that is
+  not on the active side, then to the other end of the same plane, if this is nearer to what a mirror shows;
+- a torus: the path goes through the hole, and never through the plane outside of the ring.
+
+Of several pieces around one cylinder or torus only that which comes nearest to its axis, or its ring, need do so. The
+others bend where they go through it, the shorter way.
+
+All points are in the frame of the surface, in m. Neighbours of a piece that are inside count as on the surface.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, inf, pi, sin, sqrt
+
+from osimlite.mechanics.kernels.cable_surfaces import (
+    CYLINDER,
+    ELLIPSOID,
+    KIND,
+    RADIUS,
+    SPHERE,
+    SQUARE,
+    TORUS,
+    TUBE,
+    WEIGHTS,
+    value,
+)
+from osimlite.mechanics.kernels.pointers import Floats, at
+from osimlite.mechanics.kernels.wrap_cylinder import closest_to_axis
+from osimlite.mechanics.kernels.wrap_sides import action, on_side
+from osimlite.mechanics.kernels.wrapping import NONE
+from osimlite.mechanics.laws.vectors import (
+    Vector,
+    along,
+    component,
+    cross,
+    dot,
+    elementwise,
+    minus,
+    norm,
+    plus,
+    put,
+    replaced,
+    times,
+    unit,
+    vector,
+)
+
+AXIS, SIDE, HALF_LENGTH, SURFACE = 0, 1, 2, 3
+"""Numbers of what a path wraps around: axis and sign of its side, half its length (of a cylinder), the surface."""
+
+Start = tuple[float, Vector, Vector, float]
+"""The angle by which a path turns on a surface, and 0 or less if it does not touch; the point where it meets the
+surface; its direction there; its length on the surface, m."""
+
+AS_MEANT, ANY_SIDE, PULLED = 1.0, 2.0, 3.0
+"""How a surface may bend a piece: on the side that is meant; on any side where the piece goes through it; around an
+ellipsoid where a string comes to lie."""
+
+LEAST = 1e-100
+"""Denominators are at least this, so that nothing is divided by zero."""
+SAMPLES, STEPS = 16, 6
+"""The place of a line that is nearest to a ring is found among so many, and made exact in so many steps."""
+NEAR_MIDDLE = 0.3
+"""A line goes through near the middle of a sphere if its squared distance, in radii (see `depth`), is less."""
+WAYS, WORTHWHILE = 16, 1.5
+"""So many directions across a line are tried on an ellipsoid; the next best is worth trying if the line is at most so
+much deeper there."""
+ASIDE = 0.5
+"""A line is bent in the direction that its axis tells, if the cosine with the one where it is least deep is less."""
+BENT, BEADS, PULLS = 0.7, 16, 8
+"""If the cosine between both ends of a path is less than this, a string is pulled tight over an ellipsoid: of so many
+pieces, so often."""
+
+
+def start(p: Floats, first: Vector, second: Vector, how: float, about: Vector, room: Floats) -> Start:
+    """Where a straight piece between two points begins to bend around what the numbers tell of.
+
+    Args:
+        p: the numbers.
+        first: where the piece begins.
+        second: where it ends.
+        how: it may be bent.
+        about: about this axis, as by the right hand, it turns around a surface without a side; zeros if that is open.
+        room: for a string of beads.
+    """
+    axis, side, surface = int(p[AXIS]), p[SIDE], at(p, SURFACE)
+    if surface[KIND] == TORUS:
+        return around_torus(surface[RADIUS], surface[TUBE], first, second, axis, side, how)
+    if surface[KIND] == CYLINDER:
+        is_held = how != ANY_SIDE and axis < 2
+        side_out = replaced((0.0, 0.0, 0.0), axis, side if is_held else 0.0)
+        return around_cylinder(surface[RADIUS], p[HALF_LENGTH], first, second, side_out, component(about, 2))
+    return around_ellipsoid(surface, first, second, axis, side, how, about, room)
+
+
+def ways_past(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
+    """In how many directions a line that goes through an open surface is to be bent, to find the shortest way.
+
+    Around a surface alone there is another one only on an ellipsoid. Among others each is passed on either side, and a
+    sphere, on which any direction may be the best, also across these if the line goes through near its middle.
+    """
+    if not is_alone:
+        return 4 if p[KIND] == SPHERE and depth(p, first, second) < NEAR_MIDDLE else 2
+    if p[KIND] != ELLIPSOID:
+        return 1
+    way, weights = minus(second, first), vector(p, WEIGHTS)
+    part = -dot(elementwise(weights, first), way) / max(dot(elementwise(weights, way), way), LEAST)
+    x, y, z = weights
+    out = way_out((sqrt(1.0 / x), sqrt(1.0 / y), sqrt(1.0 / z)), along(first, part, way), way, WORTHWHILE)
+    return 2 if dot(out, out) > 0.0 else 1
+
+
+def depth(p: Floats, first: Vector, second: Vector) -> float:
+    """How near a piece comes to the middle: squared, to the axis of a cylinder or the ring of a torus (m^2), or to the
+    centre of a sphere or an ellipsoid (by radii)."""
+    if p[KIND] == TORUS:
+        return distance_from_ring(nearest_to_ring(p[RADIUS], first, second), p[RADIUS])
+    way, weights = minus(second, first), vector(p, WEIGHTS)
+    square = dot(elementwise(weights, way), way)
+    part = min(max(-dot(elementwise(weights, first), way) / max(square, LEAST), 0.0), 1.0)
+    middle = along(first, part, way)
+    return dot(elementwise(weights, middle), middle) / (p[SQUARE] if p[KIND] != CYLINDER else 1.0)
+
+
+def around_cylinder(
+    radius: float, half_length: float, first: Vector, second: Vector, side_out: Vector, about: float
+) -> Start:
+    """The start on a cylinder about z: a straight line once the cylinder is rolled out.
+
+    As in OpenSim there is none if the path would meet and leave the cylinder beyond its ends.
+    """
+    px, py, pz = first
+    qx, qy, qz = second
+    ux, uy, _ = side_out
+    closest, crosses = closest_to_axis(first, second, radius)
+    is_open = ux == 0.0 and uy == 0.0
+    active = dot(side_out, first) >= 0.0, dot(side_out, second) >= 0.0
+    if (
+        about == 0.0
+        and (NONE if is_open and not crosses else action(*active, dot(side_out, closest) >= 0.0, crosses)) == NONE
+    ):
+        return 0.0, first, second, 0.0
+    # Angles from the middle of the active side; or from the first end.
+    if is_open:
+        ux, uy = px, py
+    one, two = atan2(ux * py - uy * px, ux * px + uy * py), atan2(ux * qy - uy * qx, ux * qx + uy * qy)
+    far1, far2 = sqrt(px * px + py * py), sqrt(qx * qx + qy * qy)
+    line1, line2 = sqrt(max(far1 * far1 - radius * radius, 0.0)), sqrt(max(far2 * far2 - radius * radius, 0.0))
+    before, after = atan2(line1, radius), atan2(line2, radius)
+    sweep = (two - one) % (2.0 * pi)
+    way = 1.0 if (sweep <= pi if is_open else turns_left(one, before, two, after, sweep)) else -1.0
+    if about != 0.0:
+        way = 1.0 if about > 0.0 else -1.0
+    turn = (sweep if way > 0.0 else 2.0 * pi - sweep) - before - after
+    size = sqrt(ux * ux + uy * uy)
+    c, s = cos(one + way * before) / size, sin(one + way * before) / size
+    nx, ny = c * ux - s * uy, c * uy + s * ux
+    slope = (qz - pz) / max(line1 + radius * max(turn, 0.0) + line2, LEAST)
+    z = pz + slope * line1
+    if abs(z) > half_length and abs(qz - slope * line2) > half_length:
+        turn = 0.0
+    return turn, (radius * nx, radius * ny, z), (-way * ny, way * nx, slope), radius * turn * sqrt(1.0 + slope * slope)
+
+
+def turns_left(one: float, before: float, two: float, after: float, sweep: float) -> bool:
+    """Whether a path turns to the left around a cylinder, so that it stays on the active side as in OpenSim.
+
+    It goes by that tangent of the first end which meets the active side, or if both do or none does, by that of the
+    second; if these do not tell either, the shorter way, but the longer one from behind to behind.
+
+    Args:
+        one: angle of the first end from the middle of the active side.
+        before: angle from there to its tangents.
+        two: angle of the second end.
+        after: angle from there to its tangents.
+        sweep: angle from end to end to the left, from 0 on.
+    """
+    left1, right1 = cos(one + before) >= 0.0, cos(one - before) >= 0.0
+    left2, right2 = cos(two - after) >= 0.0, cos(two + after) >= 0.0
+    if left1 != right1:
+        return left1
+    if left2 != right2:
+        return left2
+    return (sweep <= pi) == (left1 or left2)
+
+
+def around_ellipsoid(
+    p: Floats,
+    first: Vector,
+    second: Vector,
+    axis: int,
+    side: float,
+    how: float,
+    about: Vector,
+    room: Floats,
+) -> Start:
+    """The start on a sphere or an ellipsoid: on a circle, where all is so scaled that the surface is the unit sphere.
+
+    The circle is in the plane of the ends and the direction in which the line is least deep in the surface.
+    """
+    weights = vector(p, WEIGHTS)
+    wx, wy, wz = times(1.0 / p[SQUARE], weights)
+    scale = sx, sy, sz = sqrt(wx), sqrt(wy), sqrt(wz)
+    radii = 1.0 / sx, 1.0 / sy, 1.0 / sz
+    one, two = elementwise(scale, first), elementwise(scale, second)
+    way = minus(two, one)
+    part = min(max(-dot(one, way) / max(dot(way, way), LEAST), 0.0), 1.0)
+    middle = along(one, part, way)
+    if not dot(middle, middle) < 1.0:
+        return 0.0, first, way, 0.0
+    out = middle
+    if p[KIND] == ELLIPSOID or norm(cross(middle, way)) < LEAST:
+        # Of two ways both begin where it is narrow.
+        out = way_out(
+            radii, times(0.0 if norm(about) > 0.0 else 1.0, elementwise(radii, middle)), elementwise(radii, way), 0.0
+        )
+    if norm(about) > 0.0:
+        out = times(-1.0 if dot(about, cross(out, elementwise(radii, way))) < 0.0 else 1.0, out)
+        # Across the side where it is least deep: another surface may make that the shortest.
+        other = cross(elementwise(radii, way), about)
+        if p[KIND] == SPHERE and dot(unit(other), unit(out)) < ASIDE:
+            out = other
+    if side != 0.0 and not on_side(out, axis, side):
+        # Towards where a mirror would have it, which itself is near no geodesic.
+        mirrored = replaced(out, axis, -component(out, axis))
+        out = times(1.0 if dot(mirrored, out) >= 0.0 else -1.0, out)
+    out = elementwise(scale, out)
+    result = on_section(radii, one, two, cross(out, way), room)
+    turn, _, sets_out, _ = result
+    is_bent = dot(unit(sets_out), unit(vector(room, 0))) < BENT and (side == 0.0 or dot(out, middle) > 0.0)
+    if p[KIND] == ELLIPSOID and (is_bent or how == PULLED):
+        result = shortened(p, turn, first, second, room)
+    return result
+
+
+def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector:
+    """The direction across a line in which it is least below the widest of an ellipsoid, a unit vector.
+
+    Args:
+        radii: of the ellipsoid.
+        middle: a point of the line.
+        way: along the line.
+        deeper: if positive, return the next direction in which it is less so than in those beside; zeros if there is
+            none, or if the line is so many times deeper there.
+    """
+    x, y, z = way
+    axis = 0 if abs(x) <= min(abs(y), abs(z)) else (1 if abs(y) <= abs(z) else 2)
+    a = unit(cross(way, replaced((0.0, 0.0, 0.0), axis, 1.0)))
+    b = cross(unit(way), a)
+    ra, rb = elementwise(radii, a), elementwise(radii, b)
+    aa, ab, bb = dot(ra, ra), dot(ra, rb), dot(rb, rb)
+    ma, mb = dot(middle, a), dot(middle, b)
+    best = second = (inf, 0.0)
+    before, here = below(aa, ab, bb, ma, mb, -2), below(aa, ab, bb, ma, mb, -1)
+    for k in range(WAYS):
+        after = below(aa, ab, bb, ma, mb, k)
+        if here < before and here <= after:
+            result = here, 2.0 * pi / WAYS * (k - 1 + 0.5 * (before - after) / (before - 2.0 * here + after))
+            if here < best[0]:
+                best, second = result, best
+            elif here < second[0]:
+                second = result
+        before, here = here, after
+    depth, angle = second if deeper > 0.0 else best
+    if depth == inf or depth > max(deeper, 1.0) * best[0]:
+        return 0.0, 0.0, 0.0
+    return along(times(cos(angle), a), sin(angle), b)
+
+
+def below(aa: float, ab: float, bb: float, ma: float, mb: float, k: int) -> float:
+    """How far a line is below the widest of an ellipsoid in a direction across it, by products of scaled directions."""
+    c, s = cos(2.0 * pi / WAYS * k), sin(2.0 * pi / WAYS * k)
+    return sqrt(aa * c * c + 2.0 * ab * c * s + bb * s * s) - ma * c - mb * s
+
+
+def on_section(radii: Vector, one: Vector, two: Vector, across: Vector, room: Floats) -> Start:
+    """The start on a section of an ellipsoid, and beads along it.
+
+    Args:
+        radii: of the ellipsoid.
+        one: an end, so scaled that the surface is the unit sphere.
+        two: the other end, likewise.
+        across: normal to the plane of the section; the path turns to the left about it.
+        room: filled with the direction at the end, and the beads.
+    """
+    normal = unit(across)
+    centre = times(dot(normal, one), normal)
+    radius = sqrt(max(1.0 - dot(centre, centre), 0.0))
+    a1, a2 = touching(minus(one, centre), radius, normal, 1.0), touching(minus(two, centre), radius, normal, -1.0)
+    across = cross(normal, a1)
+    turn = atan2(dot(across, a2), dot(a1, a2))
+    if turn < -1e-6:
+        turn += 2.0 * pi
+    put(room, 0, elementwise(radii, cross(normal, a2)))
+    length = 0.0
+    for k in range(1, BEADS):
+        angle = turn * (k - 0.5) / (BEADS - 1)
+        c, s = cos(angle), sin(angle)
+        length += norm(elementwise(radii, along(times(c, across), -s, a1)))
+        put(room, 3 * k, elementwise(radii, along(along(centre, c, a1), s, across)))
+    return turn, elementwise(radii, along(centre, 1.0, a1)), elementwise(radii, across), turn / (BEADS - 1) * length
+
+
+def shortened(p: Floats, turn: float, first: Vector, second: Vector, room: Floats) -> Start:
+    """A start from a string of beads that is pulled tight over an ellipsoid, by few of them at first.
+
+    A section that turns far may be near no geodesic, or not near the shortest one.
+    """
+    put(room, 0, first)
+    put(room, 3 * BEADS, second)
+    stride = BEADS // 4
+    one, two = BEADS, 0
+    while stride > 0:
+        for pull in range(PULLS + 1):
+            # Those that are new come first.
+            for k in range(stride, BEADS, stride if pull > 0 else 2 * stride):
+                bead = times(0.5, plus(vector(room, 3 * (k - stride)), vector(room, 3 * (k + stride))))
+                if value(p, bead) > 0.0:
+                    for _ in range(2):
+                        out = elementwise(vector(p, WEIGHTS), bead)
+                        bead = along(bead, 0.5 * value(p, bead) / dot(out, out), out)
+                    if stride == 1 and pull == PULLS:
+                        one, two = min(one, k), k
+                put(room, 3 * k, bead)
+        stride //= 2
+    if two == 0:
+        return 0.0, first, second, 0.0
+    begin, end = vector(room, 3 * one - 3), vector(room, 3 * one)
+    length = 0.5 * (norm(minus(end, begin)) + norm(minus(vector(room, 3 * two + 3), vector(room, 3 * two))))
+    for k in range(one, two):
+        length += norm(minus(vector(room, 3 * k + 3), vector(room, 3 * k)))
+    return turn, times(0.5, plus(begin, end)), minus(end, begin), length
+
+
+def touching(point: Vector, radius: float, normal: Vector, way: float) -> Vector:
+    """Where the line from a point touches a circle about the origin that is gone around in a way; not from inside."""
+    distance = max(norm(point), LEAST)
+    cosine = min(radius / distance, 1.0)
+    foot = times(radius * cosine / distance, point)
+    return along(foot, way * radius * sqrt(1.0 - cosine * cosine) / distance, cross(normal, point))
+
+
+def around_torus(ring: float, tube: float, first: Vector, second: Vector, axis: int, side: float, how: float) -> Start:
+    """The start on a torus about z: as on a cylinder in the place of the ring that is nearest to the line."""
+    x, y, _ = near = nearest_to_ring(ring, first, second)
+    if side != 0.0 and not on_side(near, axis, side):
+        return 0.0, first, near, 0.0
+    rx, ry, _ = inwards = unit((-x, -y, 0.0))
+    centre, tangent = times(-ring, inwards), (-ry, rx, 0.0)
+    one, two = seen(minus(first, centre), inwards, tangent), seen(minus(second, centre), inwards, tangent)
+    turn, point, way, length = around_cylinder(tube, inf, one, two, (0.0 if how == ANY_SIDE else 1.0, 0.0, 0.0), 0.0)
+    return turn, along(back(point, inwards, tangent), 1.0, centre), back(way, inwards, tangent), length
+
+
+def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
+    """The point of a piece that is nearest to a ring about z."""
+    wx, wy, wz = way = minus(second, first)
+    best, least = 0.0, inf
+    for k in range(SAMPLES + 1):
+        distance = distance_from_ring(along(first, k / SAMPLES, way), ring)
+        if distance < least:
+            best, least = k / SAMPLES, distance
+    for _ in range(STEPS):
+        x, y, z = along(first, best, way)
+        square = max(x * x + y * y, LEAST)
+        outer, flat = sqrt(square), x * wx + y * wy
+        slope = flat * (1.0 - ring / outer) + z * wz
+        bends = (wx * wx + wy * wy) * (1.0 - ring / outer) + ring * flat * flat / (square * outer) + wz * wz
+        if not bends > 0.0:
+            break
+        best = min(max(best - slope / bends, 0.0), 1.0)
+    return along(first, best, way)
+
+
+def distance_from_ring(point: Vector, ring: float) -> float:
+    """Squared distance from a ring about z."""
+    x, y, z = point
+    across = sqrt(x * x + y * y) - ring
+    return across * across + z * z
+
+
+def seen(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
+    """A vector along the axes of the cylinder in the place of the ring: inwards, down, and along the ring."""
+    _, _, z = point
+    return dot(inwards, point), -z, dot(tangent, point)
+
+
+def back(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
+    """A vector along these axes, in the frame of the torus."""
+    x, y, z = point
+    return along(along((0.0, 0.0, -y), x, inwards), z, tangent)

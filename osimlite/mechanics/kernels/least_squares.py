@@ -1,0 +1,231 @@
+"""Linear equations that may repeat or contradict each other, and positive definite ones.
+
+The complete orthogonal decomposition by reflections (G. H. Golub, C. F. Van Loan, Matrix Computations, 1996, chapters
+5.2 and 5.5): the equations are taken in the order of what they say beyond those before them, as long as that is enough,
+and turned into those of as many unknowns; the rest follows from these or contradicts them.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, WORK
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+
+REDUNDANT = 1e-9
+"""An equation that differs from what others say by less than this part of itself says nothing new."""
+ROUNDING = 1e-13
+"""What is shorter than this part of the longest equation, or than this at all, is rounding error: in m and rad."""
+
+# A factor of count equations for size unknowns: the turned equations with the reflections (count, size), their diagonal
+# and order (2, count), and if there are more equations than count, these turned once more (count, count) with diagonal;
+# at the end how many equations count.
+FACTOR_EXTRA = 3
+
+
+def factor_room(count: int, size: int) -> int:
+    """How many numbers a factor has."""
+    return count * size + count * count + FACTOR_EXTRA * count + 1
+
+
+def factored(model: Ints, data: Floats, count: int, a: Floats, smallest: float) -> int:
+    """Turn equations for all speeds into the factor, see `factorise`; returns how many count."""
+    data[WORK.SCRATCH] = smallest
+    return call(
+        model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.FACTORISE]], model, data, data, a, a, count
+    )
+
+
+def solved(model: Ints, count: int, a: Floats, values: Floats, room: Floats, reals: Floats) -> None:
+    """The shortest x that comes nearest to fulfilling equations that were `factored`, see `minimum_norm`."""
+    call(
+        model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.MINIMUM_NORM]],
+        model,
+        values,
+        room,
+        a,
+        reals,
+        count,
+    )
+
+
+def factorise_law(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int) -> int:
+    """`factorise` for others to call by its address: the factor f, what counts in SCRATCH."""
+    size = model[MODEL.DOFS]
+    rank = factorise(count, size, f, data[WORK.SCRATCH])
+    f[factor_room(count, size) - 1] = rank
+    return rank
+
+
+def minimum_norm_law(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int) -> int:
+    """`minimum_norm` for others to call by its address: right sides x, room w, factor y, solution f."""
+    size = model[MODEL.DOFS]
+    rank = int(y[factor_room(count, size) - 1])
+    minimum_norm(count, size, y, rank, reals, data, f)
+    return rank
+
+
+def factorise(count: int, size: int, a: Floats, smallest: float) -> int:
+    """Turn equations, whose left sides (count, size) a factor begins with, into the factor.
+
+    What an equation says beyond others counts if it is more than `smallest` times what the strongest one says.
+
+    Returns:
+        How many equations count.
+    """
+    diagonal, order, rank = at(a, count * size), at(a, count * size + count), 0
+    for r in range(count):
+        order[r] = r
+    least = 0.0
+    for r in range(min(count, size)):
+        best, most = r, -1.0
+        for i in range(r, count):
+            square = 0.0
+            for k in range(r, size):
+                square += a[size * i + k] * a[size * i + k]
+            if square > most:
+                best, most = i, square
+        length = sqrt(max(most, 0.0))
+        if r == 0:
+            least = smallest * length
+        if not length > least:
+            break
+        if best != r:
+            order[r], order[best] = order[best], order[r]
+            for k in range(size):
+                a[size * r + k], a[size * best + k] = a[size * best + k], a[size * r + k]
+        row = at(a, size * r)
+        diagonal[r] = reflection(r, size, 1, length, row)
+        for i in range(r + 1, count):
+            reflect(r, size, 1, row, 1, at(a, size * i))
+        rank += 1
+    if rank < count:
+        # The lower trapezoid (count, rank) is turned into a triangle.
+        t, corner = at(a, count * size + FACTOR_EXTRA * count), at(a, count * size + 2 * count)
+        for i in range(count):
+            for k in range(rank):
+                t[count * i + k] = a[size * i + k] if k < i else (diagonal[i] if k == i else 0.0)
+        for r in range(rank):
+            square = 0.0
+            for i in range(r, count):
+                square += t[count * i + r] * t[count * i + r]
+            column = at(t, r)
+            corner[r] = reflection(r, count, count, sqrt(square), column)
+            for k in range(r + 1, rank):
+                reflect(r, count, count, column, count, at(t, k))
+    return rank
+
+
+def reflection(first: int, end: int, stride: int, length: float, v: Floats) -> float:
+    """Make of a vector from an entry on the one whose reflection leaves that entry only; returns what that becomes."""
+    lead = v[stride * first]
+    value = -length if lead > 0.0 else length
+    if length > 0.0:
+        v[stride * first] = lead - value
+        # So that the square of the vector is 2.
+        scale = 1.0 / sqrt(length * (length + abs(lead)))
+        for k in range(first, end):
+            v[stride * k] *= scale
+    return value
+
+
+def reflect(first: int, end: int, stride: int, v: Floats, apart: int, x: Floats) -> None:
+    """Reflect a vector in another; how far the entries of the mirror stand apart, and those of the vector."""
+    total = 0.0
+    for k in range(first, end):
+        total += v[stride * k] * x[apart * k]
+    for k in range(first, end):
+        x[apart * k] -= total * v[stride * k]
+
+
+def minimum_norm(count: int, size: int, a: Floats, rank: int, values: Floats, room: Floats, x: Floats) -> None:
+    """The shortest x (size,) that comes nearest to fulfilling factored equations with right sides (count,).
+
+    Args:
+        count: of the equations.
+        size: of the unknowns.
+        a: the factor.
+        rank: how many equations count.
+        values: the right sides.
+        room: for as many numbers.
+        x: filled.
+    """
+    diagonal, order = at(a, count * size), at(a, count * size + count)
+    for i in range(count):
+        room[i] = values[int(order[i])]
+    if rank < count:
+        t, corner = at(a, count * size + FACTOR_EXTRA * count), at(a, count * size + 2 * count)
+        for r in range(rank):
+            reflect(r, count, count, at(t, r), 1, room)
+        for r in range(rank - 1, -1, -1):
+            total = room[r]
+            for k in range(r + 1, rank):
+                total -= t[count * r + k] * room[k]
+            room[r] = total / corner[r]
+    else:
+        for r in range(rank):
+            total = room[r]
+            for k in range(r):
+                total -= a[size * r + k] * room[k]
+            room[r] = total / diagonal[r]
+    for k in range(size):
+        x[k] = room[k] if k < rank else 0.0
+    apply_q(size, a, rank, x)
+
+
+def apply_q(size: int, a: Floats, rank: int, x: Floats) -> None:
+    """From turned unknowns to the unknowns; those from `rank` on are free."""
+    for r in range(rank - 1, -1, -1):
+        reflect(r, size, 1, at(a, size * r), 1, x)
+
+
+def write_null_space(size: int, a: Floats, rank: int, basis: Floats) -> None:
+    """Write an orthonormal basis of the null space of factorised equations, by rows (size - rank, size).
+
+    Args:
+        size: number of unknowns.
+        a: the equations as `factorise` leaves them.
+        rank: their rank.
+        basis: the vectors of the basis, one after the other.
+    """
+    for k in range(size - rank):
+        direction = at(basis, size * k)
+        for j in range(size):
+            direction[j] = 0.0
+        direction[rank + k] = 1.0
+        apply_q(size, a, rank, direction)
+
+
+def cholesky(size: int, a: Floats, smallest: float) -> bool:
+    """Factorise a symmetric matrix (size, size), of which the lower triangle counts, in its place.
+
+    Returns:
+        Whether each pivot is more than `smallest` times its entry of the matrix.
+    """
+    for i in range(size):
+        row, entry = at(a, size * i), a[size * i + i]
+        for k in range(i + 1):
+            other, total = at(a, size * k), row[k]
+            for j in range(k):
+                total -= row[j] * other[j]
+            if k < i:
+                row[k] = total / other[k]
+            else:
+                if not total > smallest * entry:
+                    return False
+                row[i] = sqrt(total)
+    return True
+
+
+def substitute(size: int, a: Floats, x: Floats) -> None:
+    """Solve with the factor of `cholesky` in place."""
+    for i in range(size):
+        total = x[i]
+        for k in range(i):
+            total -= a[size * i + k] * x[k]
+        x[i] = total / a[size * i + i]
+    for i in range(size - 1, -1, -1):
+        total = x[i]
+        for k in range(i + 1, size):
+            total -= a[size * k + i] * x[k]
+        x[i] = total / a[size * i + i]

@@ -1,0 +1,66 @@
+"""Runge-Kutta-Merson, as Simbody's RungeKuttaMersonIntegrator takes its steps, rounding for rounding."""
+
+from __future__ import annotations
+
+from math import inf
+
+from osimlite.mechanics.kernels.error_control import judge, step_end, step_error
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
+from osimlite.mechanics.kernels.method import ERRORS, EVALUATED, HAS_DERIVATIVE, MEMORY, REACHED
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+
+HEAD, STATES, IS_IMPLICIT = MEMORY + 1, 3, False
+ORDER = 4.0
+"""Of the error."""
+
+
+def merson(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
+    """Try one step from y0, behind which its derivative stands, to y1."""
+    h = at(data, place)
+    errors, stages = at(data, model[MODEL.WORK_STATE] + ERRORS * model[MODEL.STATE_SIZE]), at(h, HEAD)
+    t0, t1 = h[REACHED], step_end(h)
+    h[EVALUATED], h[HAS_DERIVATIVE] = 4.0, 0.0
+    error = inf
+    if staged(model, reals, data, t0, t1, y0, y1, errors, stages) == OUTCOME.OK:
+        error = step_error(model, reals, data, t1, y0, y1, errors, h, 0)
+    judge(h, t1, error, ORDER)
+    return OUTCOME.OK
+
+
+def staged(
+    model: Ints, reals: Floats, data: Floats, t0: float, t1: float, y0: Floats, y1: Floats, ya: Floats, stages: Floats
+) -> int:
+    """Compute y1 and, in `ya`, its errors."""
+    size, h = model[MODEL.STATE_SIZE], t1 - t0
+    f0, fa, fb, fc = at(y0, size), stages, at(stages, size), at(stages, 2 * size)
+    for stage in range(4):
+        # Where the next evaluation is to be.
+        f, t = fa, t1
+        if stage == 0:
+            c = h / 3.0
+            t = t0 + c
+            for k in range(size):
+                ya[k] = y0[k] + c * f0[k]
+        elif stage == 1:
+            c, f, t = h / 6.0, fb, t0 + h / 3.0
+            for k in range(size):
+                ya[k] = y0[k] + c * (f0[k] + fa[k])
+        elif stage == 2:
+            c, f, t = h / 8.0, fc, t0 + h / 2.0
+            for k in range(size):
+                ya[k] = y0[k] + c * (f0[k] + 3.0 * fb[k])
+        else:
+            # Its error is of one order less than that of y1.
+            c = h / 2.0
+            for k in range(size):
+                ya[k] = y0[k] + c * (f0[k] - 3.0 * fb[k] + 4.0 * fc[k])
+        data[WORK.TIME] = t
+        status = call(model[MODEL.LAWS], model, reals, data, ya, f, STAGE.ACCELERATION)
+        if status != OUTCOME.OK:
+            return status
+    c = h / 6.0
+    for k in range(size):
+        y1[k] = y0[k] + c * (f0[k] + 4.0 * fc[k] + fa[k])
+        # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its steps too.
+        ya[k] = 0.2 * (y1[k] - ya[k])
+    return OUTCOME.OK

@@ -1,0 +1,83 @@
+"""Contact of a mesh with a half space or a sphere by an elastic foundation."""
+
+from __future__ import annotations
+
+from osimlite.mechanics.kernels.layout import CONTACT_WORK, ITEM, MODEL, OUTCOME
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.points import (
+    angular_velocity,
+    apply_force,
+    apply_torque,
+    direction,
+    station,
+    velocity,
+)
+from osimlite.mechanics.laws.elastic_foundation import (
+    spring_in_half_space,
+    spring_in_sphere,
+    spring_load,
+)
+from osimlite.mechanics.laws.vectors import ZERO, Vector, dot, minus, norm, plus, put, times, vector
+
+SPRINGS = 16
+"""Where the springs stand among the numbers: stiffness and middle in the link of each."""
+
+MESH_WORK = 10
+"""The record: force and torque on the mesh, the point that they are about, and energy."""
+
+
+def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """A mesh (surface 2) on a half space or a sphere.
+
+    The integers are the links of both, the place of the pair among those of the force, the number of the springs, and
+    whether surface 1 is a half space; the numbers centre, normal and radius of surface 1 in its link, centre and radius
+    of the ball around the mesh in its link, and c, us, ud, uv, vt of the law.
+    """
+    i = at(model, item)
+    one, two, count, is_plane = i[ITEM.OWN], i[ITEM.OWN + 1], i[ITEM.OWN + 3], i[ITEM.OWN + 4]
+    p, result = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])
+    for k in range(MESH_WORK):
+        result[k] = 0.0
+    o, about = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 7))
+    n, way = direction(model, data, one, vector(p, 3)), minus(about, o)
+    if is_plane:
+        if dot(way, n) >= p[10]:
+            return OUTCOME.OK
+    elif dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
+        return OUTCOME.OK
+    v = minus(velocity(model, data, one, about), velocity(model, data, two, about))
+    turning = minus(angular_velocity(model, data, one), angular_velocity(model, data, two))
+    force = torque = ZERO
+    energy = 0.0
+    for k in range(count):
+        spring = at(p, SPRINGS + 4 * k)
+        middle = station(model, data, two, vector(spring, 1))
+        d, end = spring_in_half_space(o, n, middle) if is_plane else spring_in_sphere(o, p[6], middle)
+        if d > 0.0:
+            push, turn, stored = spring_load(
+                spring[0], p[11], p[12], p[13], p[14], p[15], middle, end, about, v, turning
+            )
+            force, torque, energy = plus(force, push), plus(torque, turn), energy + stored
+    load_mesh(model, data, item, about, force, torque, energy)
+    return OUTCOME.OK
+
+
+def load_mesh(
+    model: Ints, data: Floats, item: int, about: Vector, force: Vector, torque: Vector, energy: float
+) -> None:
+    """Apply a force at a point, and a torque, to the mesh, and their opposites to surface 1; fill both records."""
+    i = at(model, item)
+    one, two, result = i[ITEM.OWN], i[ITEM.OWN + 1], at(data, i[ITEM.RECORD])
+    contact = at(data, model[model[model[MODEL.CONTACT_AT] + i[ITEM.FIRST_CONTACT] + i[ITEM.OWN + 2]] + ITEM.RECORD])
+    put(result, 0, force)
+    put(result, 3, about)
+    put(result, 6, torque)
+    put(contact, 0, force)
+    put(contact, 3, about)
+    result[9] = energy
+    apply_force(model, data, two, about, force)
+    apply_torque(model, data, two, torque)
+    apply_force(model, data, one, about, times(-1.0, force))
+    apply_torque(model, data, one, times(-1.0, torque))
+    if norm(force) != 0.0:
+        contact[CONTACT_WORK.DEPTH] = 1.0

@@ -1,0 +1,165 @@
+"""Where the links are and how they move, outwards from ground."""
+
+from __future__ import annotations
+
+from osimlite.mechanics.kernels.layout import (
+    FIXED,
+    GRAVITY_AT,
+    ITEM,
+    LINK,
+    LINK_WORK,
+    MODEL,
+    MOTION,
+    OPERATION,
+    OPERATION_WORK,
+    OUTCOME,
+    TRANSFORM,
+    WORK,
+)
+from osimlite.mechanics.kernels.parts import (
+    link_ints,
+    link_work,
+    operation_ints,
+    operation_work,
+    screw,
+)
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.trigonometry import sine_cosine
+from osimlite.mechanics.laws.rotations import Axes, X, Y, Z, along_axes, turned_axes
+from osimlite.mechanics.laws.vectors import ZERO, Vector, along, cross, plus, put, times, vector
+
+BALL_MOVES = 1
+"""How far after the law of a ball (or a drift) that places its link is the one that moves it."""
+
+
+def place(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None:
+    """Rotations, positions and origins of all links, axes of all operations."""
+    for link in range(model[MODEL.LINKS]):
+        i, here = link_ints(model, link), link_work(model, data, link)
+        axes, origin = (X, Y, Z), ZERO
+        if i[LINK.PARENT] >= 0:
+            parent = link_work(model, data, i[LINK.PARENT])
+            axes, origin = axes_of(parent), vector(parent, LINK_WORK.POSITION)
+        for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
+            record = model[MODEL.OPERATION_AT] + OPERATION.SIZE * operation
+            j, a = at(model, record), operation_work(model, data, operation)
+            b = at(reals, model[MODEL.FIXED_AT] + FIXED.SIZE * operation)
+            if j[OPERATION.BEFORE] != TRANSFORM.NOTHING:
+                origin = plus(origin, along_axes(axes, vector(b, FIXED.TRANSLATION)))
+                if j[OPERATION.BEFORE] == TRANSFORM.MOVE:
+                    axes = turned_axes(axes, axes_of(b))
+            motion = j[OPERATION.MOTION]
+            if motion < MOTION.BALL:
+                if j[OPERATION.DOF] >= 0:
+                    amount = y[j[OPERATION.DOF]]
+                else:
+                    call(model[MODEL.LAWS + j[OPERATION.FUNCTION]], model, reals, data, y, f, operation)
+                    amount = a[OPERATION_WORK.AMOUNT]
+                if motion == MOTION.TURN:
+                    one, two, three = axes
+                    put(a, OPERATION_WORK.AXIS, three)
+                    put(a, OPERATION_WORK.POINT, origin)
+                    sine, cosine = sine_cosine(amount)
+                    axes = along(times(cosine, one), sine, two), along(times(cosine, two), -sine, one), three
+                else:
+                    axis = along_axes(axes, vector(b, FIXED.AXIS))
+                    put(a, OPERATION_WORK.AXIS, axis)
+                    origin = along(origin, amount, axis)
+            else:
+                frame = at(data, WORK.SCRATCH)
+                set_frame(frame, axes, origin)
+                call(model[MODEL.LAWS + j[OPERATION.FUNCTION]], model, reals, data, y, f, operation)
+                axes, origin = axes_of(frame), vector(frame, LINK_WORK.POSITION)
+        set_frame(here, axes, origin)
+        if i[LINK.PARENT] >= 0:
+            origin = vector(link_work(model, data, i[LINK.PARENT]), LINK_WORK.ORIGIN)
+        put(here, LINK_WORK.ORIGIN, origin)
+
+
+def axes_of(rows: Floats) -> Axes:
+    """The axes of a frame, whose rotation is given by rows."""
+    return (rows[0], rows[3], rows[6]), (rows[1], rows[4], rows[7]), (rows[2], rows[5], rows[8])
+
+
+def set_frame(rows: Floats, axes: Axes, origin: Vector) -> None:
+    """Set a rotation by rows, and the position after it."""
+    one, two, three = axes
+    rows[0], rows[3], rows[6] = one
+    rows[1], rows[4], rows[7] = two
+    rows[2], rows[5], rows[8] = three
+    put(rows, LINK_WORK.POSITION, origin)
+
+
+def move(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
+    """After `place`: velocities, accelerations without udot, columns of the speeds, rates of coordinates, controls."""
+    status, size, controls = OUTCOME.OK, model[MODEL.DOFS], model[MODEL.CONTROLS]
+    if controls > 0:
+        status = call(model[controls + ITEM.LAW], model, reals, data, y, f, controls)
+    for freedom in range(size):
+        f[freedom] = y[size + freedom]
+    for k in range(model[MODEL.SUMMED]):
+        set_row(at(data, model[MODEL.WORK_COLUMN] + 6 * model[model[MODEL.SUMMED_AT] + k]), ZERO, ZERO)
+    for link in range(model[MODEL.LINKS]):
+        i, here = link_ints(model, link), link_work(model, data, link)
+        origin = vector(here, LINK_WORK.ORIGIN)
+        # Links that are pushed upwards move in one another as under gravity.
+        spin, velocity, spin_rate, acceleration = ZERO, ZERO, ZERO, times(-1.0, vector(reals, GRAVITY_AT))
+        if i[LINK.PARENT] >= 0:
+            parent = link_work(model, data, i[LINK.PARENT])
+            spin, velocity = vector(parent, LINK_WORK.VELOCITY), vector(parent, LINK_WORK.VELOCITY + 3)
+            spin_rate, acceleration = vector(parent, LINK_WORK.ACCELERATION), vector(parent, LINK_WORK.ACCELERATION + 3)
+        for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
+            j = operation_ints(model, operation)
+            a = operation_work(model, data, operation)
+            motion, freedom = j[OPERATION.MOTION], j[OPERATION.DOF]
+            if motion < MOTION.BALL:
+                turn, shift = screw(j, a, origin)
+                if freedom >= 0:
+                    rate = y[size + freedom]
+                    column = at(data, model[MODEL.WORK_COLUMN] + 6 * freedom)
+                    if j[OPERATION.FUNCTION] == OPERATION.ALONE:
+                        set_row(column, turn, shift)
+                    else:
+                        add_row(column, 1.0, turn, shift)
+                else:
+                    rate, curvature = a[OPERATION_WORK.RATE], a[OPERATION_WORK.CURVATURE]
+                    spin_rate = along(spin_rate, curvature, turn)
+                    acceleration = along(acceleration, curvature, shift)
+                    for k in range(j[OPERATION.ARGUMENT_COUNT]):
+                        freedom = model[j[OPERATION.ARGUMENTS] + k]
+                        if freedom >= 0:
+                            add_row(
+                                at(data, model[MODEL.WORK_COLUMN] + 6 * freedom),
+                                data[j[OPERATION.GRADIENT] + k],
+                                turn,
+                                shift,
+                            )
+                turn, shift = times(rate, turn), times(rate, shift)
+            else:
+                # The origin goes to the law, and what it finds comes back.
+                result = at(data, WORK.SCRATCH)
+                put(result, 0, origin)
+                status = max(
+                    status,
+                    call(model[MODEL.LAWS + j[OPERATION.FUNCTION] + BALL_MOVES], model, reals, data, y, f, operation),
+                )
+                turn, shift = vector(result, 0), vector(result, 3)
+                acceleration, spin_rate = plus(acceleration, vector(result, 6)), plus(spin_rate, vector(result, 9))
+            # The axes are carried around by what moved before.
+            spin_rate = plus(spin_rate, cross(spin, turn))
+            acceleration = plus(acceleration, plus(cross(velocity, turn), cross(spin, shift)))
+            spin, velocity = plus(spin, turn), plus(velocity, shift)
+        set_row(at(here, LINK_WORK.VELOCITY), spin, velocity)
+        set_row(at(here, LINK_WORK.ACCELERATION), spin_rate, acceleration)
+    return status
+
+
+def set_row(row: Floats, turn: Vector, shift: Vector) -> None:
+    """Set a spatial vector."""
+    put(row, 0, turn)
+    put(row, 3, shift)
+
+
+def add_row(row: Floats, factor: float, turn: Vector, shift: Vector) -> None:
+    """Add a multiple to a spatial vector."""
+    set_row(row, along(vector(row, 0), factor, turn), along(vector(row, 3), factor, shift))

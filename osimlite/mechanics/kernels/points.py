@@ -1,0 +1,87 @@
+"""Points of links, and what pushes and turns them; a negative number of a link is ground."""
+
+from __future__ import annotations
+
+from osimlite.mechanics.kernels.layout import GRAVITY_AT, LINK_WORK
+from osimlite.mechanics.kernels.parts import link_work
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.laws.vectors import ZERO, Vector, cross, minus, plus, put, turned, vector
+
+
+def station(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
+    """Position in ground of a point of a link."""
+    if link < 0:
+        return point
+    r = link_work(model, data, link)
+    x, y, z = point
+    return (
+        r[LINK_WORK.POSITION] + r[0] * x + r[1] * y + r[2] * z,
+        r[LINK_WORK.POSITION + 1] + r[3] * x + r[4] * y + r[5] * z,
+        r[LINK_WORK.POSITION + 2] + r[6] * x + r[7] * y + r[8] * z,
+    )
+
+
+def direction(model: Ints, data: Floats, link: int, along: Vector) -> Vector:
+    """A direction of a link, in ground."""
+    return along if link < 0 else turned(link_work(model, data, link), along)
+
+
+def place_frame(model: Ints, data: Floats, link: int, rows: Floats, point: Vector, pose: Floats) -> None:
+    """Where a frame of a link is in ground, whose rotation there is given by rows: its own by rows, then its origin."""
+    for k in range(3):
+        pose[k], pose[3 + k], pose[6 + k] = direction(model, data, link, (rows[k], rows[3 + k], rows[6 + k]))
+    put(pose, 9, station(model, data, link, point))
+
+
+def velocity(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
+    """Velocity of the point of a link that is at a point of ground."""
+    if link < 0:
+        return ZERO
+    here = link_work(model, data, link)
+    v = at(here, LINK_WORK.VELOCITY)
+    px, py, pz = minus(point, vector(here, LINK_WORK.ORIGIN))
+    return v[3] + v[1] * pz - v[2] * py, v[4] + v[2] * px - v[0] * pz, v[5] + v[0] * py - v[1] * px
+
+
+def angular_velocity(model: Ints, data: Floats, link: int) -> Vector:
+    """Angular velocity of a link."""
+    return ZERO if link < 0 else vector(link_work(model, data, link), LINK_WORK.VELOCITY)
+
+
+def acceleration(model: Ints, reals: Floats, data: Floats, link: int, point: Vector) -> Vector:
+    """Acceleration of the point of a link that is at a point of ground, while the speeds do not change."""
+    if link < 0:
+        return ZERO
+    here = link_work(model, data, link)
+    v, a, g = at(here, LINK_WORK.VELOCITY), at(here, LINK_WORK.ACCELERATION), at(reals, GRAVITY_AT)
+    px, py, pz = minus(point, vector(here, LINK_WORK.ORIGIN))
+    wx, wy, wz = v[0], v[1], v[2]
+    vx, vy, vz = v[3] + wy * pz - wz * py, v[4] + wz * px - wx * pz, v[5] + wx * py - wy * px
+    # Links are pushed upwards against gravity.
+    return (
+        a[3] + g[0] + a[1] * pz - a[2] * py + wy * vz - wz * vy,
+        a[4] + g[1] + a[2] * px - a[0] * pz + wz * vx - wx * vz,
+        a[5] + g[2] + a[0] * py - a[1] * px + wx * vy - wy * vx,
+    )
+
+
+def angular_acceleration_bias(model: Ints, data: Floats, link: int) -> Vector:
+    """Angular acceleration of a link while the speeds do not change."""
+    return ZERO if link < 0 else vector(link_work(model, data, link), LINK_WORK.ACCELERATION)
+
+
+def apply_force(model: Ints, data: Floats, link: int, point: Vector, force: Vector) -> None:
+    """Apply a force at a point of ground to a link."""
+    if link < 0:
+        return
+    here = link_work(model, data, link)
+    load = at(here, LINK_WORK.WRENCH)
+    put(load, 0, plus(vector(load, 0), cross(minus(point, vector(here, LINK_WORK.ORIGIN)), force)))
+    put(load, 3, plus(vector(load, 3), force))
+
+
+def apply_torque(model: Ints, data: Floats, link: int, torque: Vector) -> None:
+    """Apply a torque to a link."""
+    if link >= 0:
+        load = at(link_work(model, data, link), LINK_WORK.WRENCH)
+        put(load, 0, plus(vector(load, 0), torque))

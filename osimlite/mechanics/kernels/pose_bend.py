@@ -1,0 +1,141 @@
+"""How the axes of a joint, each carried by those before it, bend the cost of a pose."""
+
+from __future__ import annotations
+
+from osimlite.mechanics.kernels.ball_joint import last_axis
+from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL, MOTION, OPERATION, OPERATION_WORK
+from osimlite.mechanics.kernels.parts import link_work, operation_ints, operation_work
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.pose_record import (
+    AXES_AT,
+    BEND,
+    SLIDES,
+    Fit,
+)
+from osimlite.mechanics.kernels.trigonometry import sine_cosine
+from osimlite.mechanics.laws.vectors import (
+    ZERO,
+    Vector,
+    along,
+    component,
+    cross,
+    dot,
+    elementwise,
+    minus,
+    plus,
+    times,
+    vector,
+)
+from osimlite.mechanics.laws.vectors import turned as turned_by
+
+
+def twisted(load: Floats, turned: Floats, turn: Vector, shift: Vector) -> Vector:
+    """The moment of the springs' pulls at arms that are what a motion moves their ends by.
+
+    The sum over the springs of (shift + turn x arm) x pull.
+    """
+    trace = turned[0] + turned[4] + turned[8]
+    x, y, z = turn
+    result = along(along(times(x, vector(turned, 0)), y, vector(turned, 3)), z, vector(turned, 6))
+    return along(plus(cross(shift, vector(load, 3)), result), -trace, turn)
+
+
+def bend_joint(m: Fit, y: Floats, link: int, load: Floats, turned: Floats) -> None:
+    """What the axes of one joint make of the second derivative: each is carried by those before it."""
+    p = m.p
+    places = at(p, p[AXES_AT])
+    for one in range(places[link], places[link + 1]):
+        turn, shift = axis_column(m, y, link, one)
+        carried = twisted(load, turned, turn, shift)
+        for other in range(places[link], one + 1):
+            around, _ = axis_column(m, y, link, other)
+            amount = dot(around, carried)
+            spread(m, y, other, one, amount)
+            if other < one:
+                spread(m, y, one, other, amount)
+        bend_axis(m, y, one, dot(turn, vector(load, 0)) + dot(shift, vector(load, 3)))
+
+
+def bend_axis(m: Fit, y: Floats, number: int, pull: float) -> None:
+    """What the function of one axis makes of the second derivative."""
+    model, size, bend = m.model, m.model[MODEL.DOFS], at(m.v, m.p[BEND])
+    axis = axis_of(m, number)
+    j = operation_ints(model, axis[0])
+    first = model[j[OPERATION.ARGUMENTS]] if j[OPERATION.ARGUMENT_COUNT] > 0 else -1
+    if axis[1] >= SLIDES:
+        second, part = model[j[OPERATION.ARGUMENTS] + 1], axis[1] - SLIDES
+        s1, c1 = sine_cosine(y[first])
+        s2, c2 = sine_cosine(y[second])
+        far = pull * m.reals[j[OPERATION.EXTRA] + part]
+        both = far * component((0.0, c1 * s2, s1 * s2), part)
+        bend[size * first + first] += far * component((0.0, s1 * c2, -c1 * c2), part)
+        bend[size * first + second] += both
+        bend[size * second + first] += both
+        bend[size * second + second] += far * component((-s2, s1 * c2, -c1 * c2), part)
+    elif axis[1] < 0 and j[OPERATION.DOF] < 0 and j[OPERATION.ARGUMENT_COUNT] == 1 and first >= 0:
+        bend[size * first + first] += pull * operation_work(model, m.data, axis[0])[OPERATION_WORK.CURVATURE]
+
+
+def axis_of(m: Fit, number: int) -> Ints:
+    """The operation of an axis, and which part of a ball it is."""
+    return at(m.p, m.p[AXES_AT] + m.model[MODEL.LINKS] + 1 + 2 * number)
+
+
+def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vector]:
+    """The motion of a unit of one axis of a link."""
+    model, data, axis = m.model, m.data, axis_of(m, number)
+    j, a = (
+        operation_ints(model, axis[0]),
+        operation_work(model, data, axis[0]),
+    )
+    around, center = vector(a, OPERATION_WORK.AXIS), vector(a, OPERATION_WORK.POINT)
+    if axis[1] >= SLIDES:
+        part = axis[1] - SLIDES
+        sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
+        return ZERO, times(sign, (a[part], a[3 + part], a[6 + part]))
+    if axis[1] >= 0:
+        around = vector(data, model[MODEL.WORK_COLUMN] + 6 * model[j[OPERATION.ARGUMENTS] + axis[1]])
+        far = elementwise(vector(m.reals, j[OPERATION.EXTRA]), last_axis(y, at(model, j[OPERATION.ARGUMENTS])))
+        center = plus(center, turned_by(a, far))
+    elif j[OPERATION.MOTION] != MOTION.TURN:
+        return ZERO, around
+    return around, cross(minus(center, vector(link_work(model, data, link), LINK_WORK.ORIGIN)), around)
+
+
+def spread(m: Fit, y: Floats, one: int, two: int, amount: float) -> None:
+    """Add to the second derivative a multiple of what a pair of axes is to all pairs of coordinates."""
+    size, bend = m.model[MODEL.DOFS], at(m.v, m.p[BEND])
+    for k in range(arguments_of(m, one)):
+        first, gain = argument(m, y, one, k)
+        if first < 0:
+            continue
+        for other in range(arguments_of(m, two)):
+            second, more = argument(m, y, two, other)
+            if second >= 0:
+                bend[size * first + second] += amount * gain * more
+
+
+def arguments_of(m: Fit, number: int) -> int:
+    """How many coordinates an axis goes by."""
+    model, axis = m.model, axis_of(m, number)
+    j = operation_ints(model, axis[0])
+    if axis[1] >= SLIDES:
+        return 2
+    return 1 if axis[1] >= 0 or j[OPERATION.DOF] >= 0 else j[OPERATION.ARGUMENT_COUNT]
+
+
+def argument(m: Fit, y: Floats, number: int, k: int) -> tuple[int, float]:
+    """A coordinate that an axis goes by, and how far it goes by a unit of it."""
+    model, axis = m.model, axis_of(m, number)
+    j = operation_ints(model, axis[0])
+    if axis[1] >= SLIDES:
+        part = axis[1] - SLIDES
+        s1, c1 = sine_cosine(y[model[j[OPERATION.ARGUMENTS]]])
+        s2, c2 = sine_cosine(y[model[j[OPERATION.ARGUMENTS] + 1]])
+        slope = (0.0, -c1 * c2, -s1 * c2) if k == 0 else (c2, s1 * s2, -c1 * s2)
+        return model[j[OPERATION.ARGUMENTS] + k], m.reals[j[OPERATION.EXTRA] + part] * component(slope, part)
+    if axis[1] >= 0:
+        return model[j[OPERATION.ARGUMENTS] + axis[1]], 1.0
+    if j[OPERATION.DOF] >= 0:
+        return j[OPERATION.DOF], 1.0
+    return model[j[OPERATION.ARGUMENTS] + k], m.data[j[OPERATION.GRADIENT] + k]

@@ -1,0 +1,145 @@
+"""Poses in which couplers and equations hold, and how equations are bent."""
+
+from __future__ import annotations
+
+from math import inf
+
+from osimlite.mechanics.kernels.layout import MODEL
+from osimlite.mechanics.kernels.least_squares import cholesky, factorise, minimum_norm, substitute
+from osimlite.mechanics.kernels.pointers import Floats, at
+from osimlite.mechanics.kernels.pose_cost import coupled, equations_of, follow_couplers, look
+from osimlite.mechanics.kernels.pose_record import (
+    AT_END,
+    COUPLER_AT,
+    COUPLERS,
+    CURVES,
+    DEPENDENT_OF,
+    ERRORS,
+    FREE_AT,
+    GOALS,
+    HELD,
+    HELD_AT,
+    MARKERS,
+    MEASURED,
+    RANGES_AT,
+    RESOLVED_AT,
+    ROOM,
+    ROWS,
+    SENSORS,
+    SLOPE,
+    STEP,
+    TRIAL,
+    VARIABLE,
+    Fit,
+)
+from osimlite.mechanics.kernels.pose_step import equations_for, list_free
+from osimlite.mechanics.kernels.projection import REDUNDANT
+from osimlite.mechanics.kernels.states import copy, is_finite
+
+EXACT = 1e-13
+"""What constraints may be off (m or rad)."""
+ASIDE = 1e-5
+"""How far differences of equations go (rad or m)."""
+
+
+def settle(m: Fit, y: Floats) -> bool:
+    """Bring a pose into the ranges, to the values that are given, and to where couplers and equations hold."""
+    p, c, v, size = m.p, m.c, m.v, m.model[MODEL.DOFS]
+    ranges, resolved = at(c, p[RANGES_AT]), at(p, p[RESOLVED_AT])
+    for k in range(size):
+        if resolved[k] == VARIABLE or resolved[k] >= AT_END:
+            y[k] = min(max(y[k], ranges[2 * k]), ranges[2 * k + 1])
+    values = at(v, p[MEASURED] + 3 * p[MARKERS] + 9 * p[SENSORS] + p[GOALS])
+    for k in range(p[HELD]):
+        y[p[p[HELD_AT] + k]] = values[k]
+    couple_all(m, y)
+    return equations_of(m) == 0 or restore(m, y)
+
+
+def couple_all(m: Fit, y: Floats) -> None:
+    """Put what depends on others where these have it."""
+    p, size = m.p, m.model[MODEL.DOFS]
+    for number in range(p[COUPLERS]):
+        i = at(p, p[p[COUPLER_AT] + number])
+        y[i[DEPENDENT_OF]], _ = coupled(m, i, y, at(m.v, p[ROOM]), at(m.v, p[ROOM] + size))
+
+
+def restore(m: Fit, y: Floats) -> bool:
+    """Bring a pose to where the equations hold, in the shortest steps of what is free; whether they do then."""
+    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
+    count, errors, step = equations_of(m), at(v, p[ERRORS]), at(v, p[STEP])
+    ranges, before = at(m.c, p[RANGES_AT]), inf
+    for _ in range(50):
+        look(m, y)
+        follow_couplers(m, y)
+        off = 0.0
+        for k in range(count):
+            off = max(off, abs(errors[k]))
+        if off <= EXACT:
+            return True
+        if off <= 1e-9 and off >= 0.5 * before:
+            return True
+        before = off
+        free = list_free(m)
+        factor, right, room = equations_for(m, free, 0)
+        rank = factorise(count, free, factor, REDUNDANT * count)
+        minimum_norm(count, free, factor, rank, right, room, step)
+        furthest = 0.0
+        for k in range(free):
+            furthest = max(furthest, abs(step[k]))
+        part = 1.0 if furthest <= 0.5 else 0.5 / furthest
+        for k in range(free):
+            freedom = p[p[FREE_AT] + k]
+            to = y[freedom] + part * step[k]
+            y[freedom] = min(max(to, ranges[2 * freedom]), ranges[2 * freedom + 1])
+        couple_all(m, y)
+        if not is_finite(size, y):
+            return False
+    return False
+
+
+def forget_bends(m: Fit) -> None:
+    """Take the equations for straight ones."""
+    size = m.model[MODEL.DOFS]
+    if equations_of(m) > 0:
+        for k in range(size * size):
+            m.v[m.p[CURVES] + k] = 0.0
+
+
+def bend_equations(m: Fit, y: Floats) -> None:
+    """Find what the equations add to the second derivative: their own, times how hard each pulls at the pose.
+
+    The derivatives are known before, and are not afterwards.
+    """
+    p, v, size, count = m.p, m.v, m.model[MODEL.DOFS], equations_of(m)
+    rows, slope, curves = at(v, p[ROWS]), at(v, p[SLOPE]), at(v, p[CURVES])
+    pulls, trial = at(curves, size * size), at(v, p[TRIAL])
+    free, normal = list_free(m), at(v, p[ROOM] + 2 * size)
+    for i in range(count):
+        pulls[i] = 0.0
+        for k in range(free):
+            pulls[i] -= rows[size * i + p[p[FREE_AT] + k]] * slope[p[p[FREE_AT] + k]]
+        for j in range(count):
+            total = 1e-12 if i == j else 0.0
+            for k in range(free):
+                freedom = p[p[FREE_AT] + k]
+                total += rows[size * i + freedom] * rows[size * j + freedom]
+            normal[count * i + j] = total
+    forget_bends(m)
+    if not cholesky(count, normal, 0.0):
+        return
+    substitute(count, normal, pulls)
+    for k in range(free):
+        freedom = p[p[FREE_AT] + k]
+        for side in range(2):
+            factor = (0.5 - side) / ASIDE
+            copy(size, y, trial)
+            trial[freedom] += ASIDE if side == 0 else -ASIDE
+            couple_all(m, trial)
+            look(m, trial)
+            follow_couplers(m, trial)
+            for i in range(count):
+                for j in range(size):
+                    change = 0.5 * factor * pulls[i] * rows[size * i + j]
+                    curves[size * freedom + j] += change
+                    curves[size * j + freedom] += change

@@ -1,0 +1,236 @@
+"""What a pose costs: how far markers, sensors and coordinates are from where they were measured.
+
+The cost is half the weighted sum of squared distances and angles. A marker weighs on its link as a point mass and pulls
+at it as a spring: the gradient is the generalized force of these springs, what the deviations' first derivatives make
+of the second derivative is the mass matrix of these masses, found by the composite-rigid-body algorithm, and the rest
+follows from how the axes of the joints turn one another (R. Featherstone, Rigid Body Dynamics Algorithms, 2008,
+chapters 2.10 and 6.2): a turn about an axis carries the columns of all that it carries.
+
+Second derivatives leave out how functions of several coordinates are bent.
+"""
+
+from __future__ import annotations
+
+from osimlite.mechanics.kernels.constrained_dynamics import bind
+from osimlite.mechanics.kernels.dynamics import momentum
+from osimlite.mechanics.kernels.functions import MONOMIALS, several_at, value_at
+from osimlite.mechanics.kernels.layout import CONSTRAINED, DOF, LINK, LINK_WORK, MODEL, STAGE
+from osimlite.mechanics.kernels.parts import link_ints, link_work
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.points import station
+from osimlite.mechanics.kernels.pose_bend import bend_joint, twisted
+from osimlite.mechanics.kernels.pose_record import (
+    ARGUMENTS_OF,
+    BALL_AT,
+    BALLS,
+    BEND,
+    COUNT_OF,
+    COUPLER_AT,
+    COUPLERS,
+    DEPENDENT_OF,
+    ERRORS,
+    GOAL_AT,
+    GOALS,
+    MARKER_AT,
+    MARKER_NUMBERS,
+    MARKERS,
+    MEASURED,
+    NUMBERS_OF,
+    ROOM,
+    ROWS,
+    SENSORS,
+    SLOPE,
+    STIFFNESS,
+    TURNED,
+    WEIGHTS,
+    Fit,
+)
+from osimlite.mechanics.kernels.pose_sensors import sensors_turn
+from osimlite.mechanics.kernels.projection import position_errors, rows_by_values
+from osimlite.mechanics.kernels.trigonometry import sine_cosine
+from osimlite.mechanics.laws.vectors import (
+    cross,
+    dot,
+    minus,
+    plus,
+    put,
+    times,
+    vector,
+)
+
+
+def cost(m: Fit, y: Floats) -> float:
+    """Cost of a pose, with the gradient and the parts of the second derivative by all free coordinates."""
+    model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
+    look(m, y)
+    for k in range(p[BALLS]):
+        turn_by_angles(m, y, at(model, p[p[BALL_AT] + k]))
+    slope, stiffness, bend = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND])
+    for k in range(size):
+        slope[k] = 0.0
+    for k in range(size * size):
+        stiffness[k] = bend[k] = 0.0
+    for link in range(model[MODEL.LINKS]):
+        here, turned = (
+            at(link_work(model, data, link), LINK_WORK.INERTIA),
+            at(v, p[TURNED] + 9 * link),
+        )
+        for k in range(16):
+            here[k] = 0.0
+        for k in range(9):
+            turned[k] = 0.0
+    value = markers_pull(m) + sensors_turn(m)
+    gather(m, y)
+    goals = 3 * p[MARKERS] + 9 * p[SENSORS]
+    for k in range(p[GOALS]):
+        freedom, weight = p[p[GOAL_AT] + k], v[p[WEIGHTS] + p[MARKERS] + p[SENSORS] + k]
+        if weight > 0.0:
+            off = y[freedom] - v[p[MEASURED] + goals + k]
+            value += 0.5 * weight * off * off
+            slope[freedom] += weight * off
+            stiffness[size * freedom + freedom] += weight
+    follow_couplers(m, y)
+    return value
+
+
+def look(m: Fit, y: Floats) -> None:
+    """Where the links are, what each coordinate moves, and the equations."""
+    model, p, v, size = m.model, m.p, m.v, m.model[MODEL.DOFS]
+    for k in range(size):
+        # So that the second derivatives of the functions are those by the coordinates.
+        y[size + k] = 1.0
+    call(model[MODEL.LAWS], model, m.reals, m.data, y, m.f, STAGE.VELOCITY)
+    if model[MODEL.CONSTRAINED] > 0:
+        bind(model, m.reals, m.data, y, m.f)
+        position_errors(model, m.data, at(v, p[ERRORS]))
+        rows_by_values(model, m.data, y, at(v, p[ROWS]))
+
+
+def turn_by_angles(m: Fit, y: Floats, angles: Ints) -> None:
+    """Make of the columns of the speeds of a ball those of the rates of its angles."""
+    columns = at(m.data, m.model[MODEL.WORK_COLUMN])
+    s1, c1 = sine_cosine(y[angles[0]])
+    s2, c2 = sine_cosine(y[angles[1]])
+    one, two, three = at(columns, 6 * angles[0]), at(columns, 6 * angles[1]), at(columns, 6 * angles[2])
+    for k in range(6):
+        a, b, c = one[k], two[k], three[k]
+        two[k] = c1 * b + s1 * c
+        three[k] = s2 * a - s1 * c2 * b + c1 * c2 * c
+
+
+def markers_pull(m: Fit) -> float:
+    """Put the masses and springs of the markers on the links; what they cost."""
+    model, data, p, v, value = m.model, m.data, m.p, m.v, 0.0
+    for k in range(p[MARKERS]):
+        weight, link = v[p[WEIGHTS] + k], p[p[MARKER_AT] + k]
+        if not weight > 0.0:
+            continue
+        point = station(model, data, link, vector(m.c, MARKER_NUMBERS * k))
+        off = minus(point, vector(v, p[MEASURED] + 3 * k))
+        value += 0.5 * weight * dot(off, off)
+        if link < 0:
+            continue
+        here = link_work(model, data, link)
+        i, load, turned = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH), at(v, p[TURNED] + 9 * link)
+        pull, arm = times(weight, off), minus(point, vector(here, LINK_WORK.ORIGIN))
+        a, b, c = arm
+        mx, my, mz = times(weight, arm)
+        i[0] += weight
+        i[1] += mx
+        i[2] += my
+        i[3] += mz
+        i[4] += my * b + mz * c
+        i[5] += mx * a + mz * c
+        i[6] += mx * a + my * b
+        i[7] -= mx * b
+        i[8] -= mx * c
+        i[9] -= my * c
+        put(load, 0, plus(vector(load, 0), cross(arm, pull)))
+        put(load, 3, plus(vector(load, 3), pull))
+        px, py, pz = pull
+        put(turned, 0, plus(vector(turned, 0), times(px, arm)))
+        put(turned, 3, plus(vector(turned, 3), times(py, arm)))
+        put(turned, 6, plus(vector(turned, 6), times(pz, arm)))
+    return value
+
+
+def gather(m: Fit, y: Floats) -> None:
+    """Gradient and second derivative by the degrees of freedom, inwards from the leaves."""
+    model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
+    freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
+    slope, stiffness, bend = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND])
+    for link in range(model[MODEL.LINKS] - 1, -1, -1):
+        j, here = link_ints(model, link), link_work(model, data, link)
+        i, load, turned = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH), at(v, p[TURNED] + 9 * link)
+        if i[0] > 0.0 or i[4] > 0.0:
+            for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
+                c = at(columns, 6 * freedom)
+                turn, shift = vector(c, 0), vector(c, 3)
+                slope[freedom] += dot(turn, vector(load, 0)) + dot(shift, vector(load, 3))
+                angular, linear = momentum(i, turn, shift)
+                carried = twisted(load, turned, turn, shift)
+                k = freedom
+                while k >= 0:
+                    c = at(columns, 6 * k)
+                    entry = dot(vector(c, 0), angular) + dot(vector(c, 3), linear)
+                    stiffness[size * freedom + k] = stiffness[size * k + freedom] = entry
+                    if k < j[LINK.FIRST_DOF]:
+                        bend[size * freedom + k] = bend[size * k + freedom] = dot(vector(c, 0), carried)
+                    k = freedoms[DOF.SIZE * k + DOF.ABOVE]
+            bend_joint(m, y, link, load, turned)
+        if j[LINK.PARENT] >= 0:
+            above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.INERTIA)
+            # The wrench stands behind the inertia.
+            for k in range(16):
+                above[k] += i[k]
+            above = at(v, p[TURNED] + 9 * j[LINK.PARENT])
+            for k in range(9):
+                above[k] += turned[k]
+
+
+def follow_couplers(m: Fit, y: Floats) -> None:
+    """Make of the derivatives, and of the equations, those by the coordinates that depend on no others."""
+    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
+    slope, stiffness, bend, rows = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND]), at(v, p[ROWS])
+    gradient, rates = at(v, p[ROOM]), at(v, p[ROOM] + size)
+    for k in range(size):
+        rates[k] = 1.0
+    for number in range(p[COUPLERS] - 1, -1, -1):
+        i = at(p, p[p[COUPLER_AT] + number])
+        own = i[DEPENDENT_OF]
+        _, bent = coupled(m, i, y, gradient, rates)
+        for k in range(i[COUNT_OF]):
+            freedom = i[ARGUMENTS_OF + k]
+            if freedom < 0:
+                continue
+            gain = gradient[k]
+            for j in range(size):
+                stiffness[size * j + freedom] += gain * stiffness[size * j + own]
+                bend[size * j + freedom] += gain * bend[size * j + own]
+            for j in range(size):
+                stiffness[size * freedom + j] += gain * stiffness[size * own + j]
+                bend[size * freedom + j] += gain * bend[size * own + j]
+            if i[COUNT_OF] == 1:
+                bend[size * freedom + freedom] += bent * slope[own]
+            slope[freedom] += gain * slope[own]
+            for j in range(equations_of(m)):
+                rows[size * j + freedom] += gain * rows[size * j + own]
+
+
+def equations_of(m: Fit) -> int:
+    """How many equations bind the positions."""
+    return m.model[m.model[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS] if m.model[MODEL.CONSTRAINED] > 0 else 0
+
+
+def coupled(m: Fit, i: Ints, y: Floats, gradient: Floats, rates: Floats) -> tuple[float, float]:
+    """Value of a coordinate that depends on others, its second derivative if it depends on one; fills the slopes."""
+    size, constants = i[COUNT_OF], at(m.c, i[NUMBERS_OF])
+    if int(constants[size]) >= MONOMIALS:
+        value, _, bent = several_at(size, at(i, ARGUMENTS_OF), constants, y, rates, gradient)
+        return value, bent
+    place = 0.0
+    if size > 0:
+        place = y[i[ARGUMENTS_OF]] if i[ARGUMENTS_OF] >= 0 else constants[0]
+    value, slope, bent = value_at(at(constants, size), place)
+    gradient[0] = slope
+    return value, bent

@@ -1,0 +1,329 @@
+"""The pose that fits measurements best, frame by frame.
+
+Newton's method on what the couplers, the equations and the ends of the ranges leave free (J. Nocedal, S. Wright,
+Numerical Optimization, 2006, chapters 10.3, 16.7 and 18.3). Where the second derivative is no bowl the part of the
+residuals is left out, as Gauss and Newton do, and where that leads nowhere the step is damped, as Levenberg and
+Marquardt do. What nothing measures hardly moves: of all poses that fit alike the nearest is found.
+"""
+
+from __future__ import annotations
+
+from math import floor, inf, pi
+
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.points import station
+from osimlite.mechanics.kernels.pose_bonds import bend_equations, forget_bends, settle
+from osimlite.mechanics.kernels.pose_cost import cost, equations_of, look
+from osimlite.mechanics.kernels.pose_record import (
+    GOALS,
+    HELD,
+    HISTORY,
+    IDLE,
+    MARKER_AT,
+    MARKER_NUMBERS,
+    MARKERS,
+    MEASURED,
+    PATTERN,
+    RESOLVED_AT,
+    SENSOR_NUMBERS,
+    SENSORS,
+    SLOPE,
+    STEP,
+    STIFFNESS,
+    TRIAL,
+    VARIABLE,
+    WEIGHTS,
+    Fit,
+)
+from osimlite.mechanics.kernels.pose_sensors import turn_of
+from osimlite.mechanics.kernels.pose_starts import (
+    INWARDS,
+    ROUND,
+    go_round,
+    leave_ends,
+    move_inwards,
+    turn_over,
+    turn_round,
+    unwind,
+)
+from osimlite.mechanics.kernels.pose_step import (
+    find_ends,
+    find_step,
+    free_ends,
+    list_free,
+    solve_free,
+)
+from osimlite.mechanics.kernels.states import copy, is_finite
+from osimlite.mechanics.laws.vectors import put
+
+FITTED, UNSEEN, STUCK, APART = 0.0, 1.0, 2.0, 3.0
+"""What becomes of a frame: the best pose; nothing was seen, the pose before; the search has ended before the best pose
+was reached; no pose near the one before keeps the constraints."""
+FINEST = 1e-9
+"""What coordinates of a pose may be off, as far as can be told from how the steps shrink (rad or m)."""
+MOST_STEPS = 200
+LIGHTEST, HEAVIEST, FIRST_DAMPING = 1e-10, 1e12, 1e-4
+"""Damping of a step: least, most, and that of the first step that is to be short."""
+VAGUE, ALIKE = 1e-7, 1e-7
+"""Least damping where there are poses that look alike; what part of its stiffness a coordinate must keep when all
+others follow, so that this is not so."""
+SMALL_STEPS = 1e-2
+"""Damping of the first step where the way down is to be followed closely."""
+PATIENCE = 8
+"""After how many steps the whole second derivative is taken, also where poses look alike or steps are short."""
+POSES = 2
+"""How many poses are kept to go on from."""
+RENEWED = 5
+"""After how many steps the second derivatives of the equations are found anew, which not every pose needs."""
+
+
+def fit_frames(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, p: Ints, c: Floats, v: Floats, frames: Floats,
+    found: Floats, count: int,
+) -> int:  # fmt: skip
+    """Fit some frames, one after the other.
+
+    Args:
+        model: the mechanism.
+        reals: its numbers.
+        data: its work.
+        y: a state, the pose to start from; then the last pose.
+        f: room for another.
+        p: the integers of the fit.
+        c: its numbers.
+        v: its work.
+        frames: of each the places of the markers (m, 3) in ground, the rotations of the sensors (k, 3, 3), the values
+            of the goals, those of what is held.
+        found: of each the values of all degrees of freedom, the places of the markers in the fitted pose (m, 3), the
+            turns of the sensors from where they were measured (k, 3), the cost, the count of the steps, and what became
+            of it.
+        count: of the frames.
+    """
+    m = Fit(model, reals, data, f, p, c, v)
+    size, markers, sensors = model[MODEL.DOFS], p[MARKERS], p[SENSORS]
+    width, given = size + 3 * (markers + sensors) + 3, 3 * markers + 9 * sensors + p[GOALS] + p[HELD]
+    for number in range(count):
+        to = at(found, width * number)
+        copy(given, at(frames, given * number), at(v, p[MEASURED]))
+        value, steps, status = fit_frame(m, y)
+        copy(size, y, to)
+        for k in range(markers):
+            place = station(
+                model,
+                data,
+                p[p[MARKER_AT] + k],
+                (c[MARKER_NUMBERS * k], c[MARKER_NUMBERS * k + 1], c[MARKER_NUMBERS * k + 2]),
+            )
+            put(to, size + 3 * k, place)
+        for k in range(sensors):
+            put(to, size + 3 * (markers + k), turn_of(m, k))
+        end = at(to, size + 3 * (markers + sensors))
+        end[0], end[1], end[2] = value, float(steps), status
+    return OUTCOME.OK
+
+
+def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
+    """Bring a pose to the best of a frame: its cost, the count of the steps, what became of it."""
+    v, p, size = m.v, m.p, m.model[MODEL.DOFS]
+    history = at(v, p[HISTORY])
+    kept, last, trial = int(history[0]), at(history, 1), at(v, p[TRIAL])
+    seen = weigh(m)
+    if kept > 0:
+        copy(size, last, y)
+    if not settle(m, y):
+        look(m, y)
+        return inf, 0, APART
+    if not seen:
+        look(m, y)
+        return 0.0, 0, UNSEEN
+    note_pattern(m, y)
+    value, is_vague = inf, v[p[PATTERN] + p[MARKERS] + p[SENSORS] + p[GOALS]] > 0.0
+    if kept > 1 and not is_vague:
+        before = at(last, size)
+        for k in range(size):
+            trial[k] = y[k] if p[p[RESOLVED_AT] + k] == IDLE else 2.0 * last[k] - before[k]
+        if settle(m, trial):
+            value = cost(m, trial)
+    # A jump is no reason to leave the pose before.
+    if not value < 4.0 * history[1 + POSES * size] + 1e-8:
+        other = cost(m, y)
+        if not value < other:
+            copy(size, y, trial)
+        value = other if not value < other else cost(m, trial)
+    lightest, start = VAGUE if is_vague else LIGHTEST, at(history, 2 + POSES * size)
+    if kept == 0:
+        copy(size, trial, last)
+    copy(size, trial, start)
+    value, steps, status = descend(m, trial, y, value, lightest, lightest)
+    if kept == 0:
+        # From far away there are several ways down; small steps find others than large ones, and what begins away from
+        # the ends of its range is not held there before it is known where it belongs.
+        value, more, status = descend_again(m, start, y, value, status, FIRST_DAMPING, lightest)
+        steps += more
+        for inwards in range(2):
+            move_inwards(m, last, start, 2.0 * INWARDS * (1 + inwards))
+            value, more, status = descend_again(m, start, y, value, status, SMALL_STEPS, lightest)
+            steps += more
+        for number in range(2 * size):
+            if turn_round(m, last, start, number // 2, ROUND if number % 2 == 0 else -ROUND):
+                value, more, status = descend_again(m, start, y, value, status, SMALL_STEPS, lightest)
+                steps += more
+    if leave_ends(m, y, start):
+        value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
+        steps += more
+    value, more, status = come_round(m, start, y, value, status, lightest)
+    steps += more
+    for number in range(size):
+        if turn_over(m, y, start, number):
+            upright = value
+            value, more, status = descend_again(m, start, y, value, status, SMALL_STEPS, lightest)
+            steps += more
+            if value < upright:
+                value, more, status = come_round(m, start, y, value, status, lightest)
+                steps += more
+    if kept == 0 and unwind(m, y, last, start, value):
+        value, more, status = descend(m, start, y, cost(m, start), lightest, lightest)
+        steps += more
+    free_ends(m)
+    before = at(last, size)
+    for k in range(size):
+        # A whole turn, from one end of a range to the other, is no movement to go on with.
+        before[k] = last[k] + 2.0 * pi * floor((y[k] - last[k]) / (2.0 * pi) + 0.5)
+    copy(size, y, last)
+    history[0], history[1 + POSES * size] = min(kept + 1.0, float(POSES)), value
+    look(m, y)
+    return value, steps, status
+
+
+def note_pattern(m: Fit, y: Floats) -> None:
+    """If other things are seen than in the frame before, find out whether poses look alike, and what moves nothing."""
+    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
+    count = p[MARKERS] + p[SENSORS] + p[GOALS]
+    weights, pattern, is_new = at(v, p[WEIGHTS]), at(v, p[PATTERN]), False
+    for k in range(count):
+        is_new = is_new or weights[k] != pattern[k]
+        pattern[k] = weights[k]
+    if not is_new and at(v, p[HISTORY])[0] > 0.0:
+        return
+    resolved = at(p, p[RESOLVED_AT])
+    for k in range(size):
+        if resolved[k] == IDLE:
+            resolved[k] = VARIABLE
+    cost(m, y)
+    for k in range(size):
+        if resolved[k] == VARIABLE and v[p[STIFFNESS] + size * k + k] == 0.0 and v[p[SLOPE] + k] == 0.0:
+            resolved[k] = IDLE
+    for k in range(size):
+        v[p[STEP] + k] = 0.0
+    pattern[count] = 1.0 if solve_free(m, list_free(m), LIGHTEST, 0.0, ALIKE) < 0 else 0.0
+
+
+def descend_again(
+    m: Fit, start: Floats, y: Floats, value: float, status: float, damping: float, lightest: float
+) -> tuple[float, int, float]:
+    """Look for a better pose than the best so far, whose cost is known, from another start; keep the better one."""
+    size = m.model[MODEL.DOFS]
+    best, trial = at(start, size), at(m.v, m.p[TRIAL])
+    copy(size, y, best)
+    copy(size, start, trial)
+    free_ends(m)
+    if not settle(m, trial):
+        return value, 0, status
+    new, steps, result = descend(m, trial, y, cost(m, trial), damping, lightest)
+    if new < value * (1.0 - 1e-7) - 1e-20:
+        return new, steps, result
+    copy(size, best, y)
+    return value, steps, status
+
+
+def come_round(
+    m: Fit, start: Floats, y: Floats, value: float, status: float, lightest: float
+) -> tuple[float, int, float]:
+    """Look for a better pose with each angle that is at an end of its range at the other one; keep the best."""
+    steps = 0
+    for number in range(m.model[MODEL.DOFS]):
+        if go_round(m, y, start, number):
+            value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
+            steps += more
+    return value, steps, status
+
+
+def weigh(m: Fit) -> bool:
+    """The weights in this frame, of markers and of sensors each as shares of what is seen; whether anything is."""
+    p, c, v = m.p, m.c, m.v
+    measured, weights = at(v, p[MEASURED]), at(v, p[WEIGHTS])
+    markers, sensors = p[MARKERS], p[SENSORS]
+    numbers, rotations = at(c, MARKER_NUMBERS * markers), at(measured, 3 * markers)
+    for k in range(markers):
+        weights[k] = c[MARKER_NUMBERS * k + 3] if is_finite(3, at(measured, 3 * k)) else 0.0
+    for k in range(sensors):
+        weights[markers + k] = numbers[SENSOR_NUMBERS * k + 9] if is_finite(9, at(rotations, 9 * k)) else 0.0
+    seen = share(markers, weights)
+    seen = share(sensors, at(weights, markers)) or seen
+    numbers, goals = at(numbers, SENSOR_NUMBERS * sensors), at(measured, 3 * markers + 9 * sensors)
+    for k in range(p[GOALS]):
+        weights[markers + sensors + k] = numbers[k] if is_finite(1, at(goals, k)) else 0.0
+        seen = seen or weights[markers + sensors + k] > 0.0
+    return seen
+
+
+def share(count: int, weights: Floats) -> bool:
+    """Make shares of some weights; whether there is any."""
+    total = 0.0
+    for k in range(count):
+        total += weights[k]
+    for k in range(count):
+        weights[k] = weights[k] / total if total > 0.0 else 0.0
+    return total > 0.0
+
+
+def descend(
+    m: Fit, start: Floats, y: Floats, value: float, damping: float, lightest: float
+) -> tuple[float, int, float]:
+    """From a pose whose cost and derivatives are known to the best nearby; fills y, and leaves marks where it ends."""
+    p, v, size = m.p, m.v, m.model[MODEL.DOFS]
+    step = at(v, p[STEP])
+    before, bends, status = inf, damping == LIGHTEST, STUCK
+    copy(size, start, y)
+    steps = 0
+    forget_bends(m)
+    while steps < MOST_STEPS:
+        steps += 1
+        if equations_of(m) > 0 and steps % RENEWED == 0:
+            bend_equations(m, y)
+            cost(m, y)
+        find_ends(m, y)
+        if not find_step(m, y, damping, bends) and not find_step(m, y, damping, False):
+            damping = max(10.0 * damping, FIRST_DAMPING)
+            if damping > HEAVIEST:
+                break
+            continue
+        length = 0.0
+        for k in range(size):
+            length = max(length, abs(step[k]))
+            start[k] = y[k] + step[k]
+        is_settled = settle(m, start)
+        new = cost(m, start) if is_settled else inf
+        # Of tiny steps rounding hides whether they lead down.
+        if new <= value or (length <= 1e-6 and new <= value * (1.0 + 1e-9) + 1e-24):
+            copy(size, start, y)
+            value = new
+            shrinking = length / before if before < inf else 1.0
+            if length <= FINEST or (shrinking < 0.5 and length * shrinking <= FINEST * (1.0 - shrinking)):
+                status = FITTED
+                break
+            before = length if damping == lightest else inf
+            damping = max(0.1 * damping, lightest)
+            # Where poses look alike the whole second derivative comes last: far from the best it leads astray.
+            bends = steps >= PATIENCE or (damping < FIRST_DAMPING and lightest == LIGHTEST)
+        else:
+            if length <= 10.0 * FINEST:
+                # No better pose can be told from this one.
+                status = FITTED
+                break
+            damping, bends, before = max(10.0 * damping, FIRST_DAMPING), steps >= PATIENCE, inf
+            if damping > HEAVIEST:
+                break
+            cost(m, y)
+    return value, steps, status

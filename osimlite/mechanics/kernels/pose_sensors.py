@@ -1,0 +1,134 @@
+"""What orientation sensors cost: the squares of the angles by which they are turned from where they were measured.
+
+A sensor is a torsion spring. If phi is the turn from the measured rotation to that of the sensor, along its axis in
+ground and as long as its angle, the half square of the angle changes with the rotation of the link by phi, and phi by
+the inverse of the left Jacobian of the rotations (G. Chirikjian, Stochastic Models, Information Theory, and Lie Groups,
+volume 2, 2012, chapter 10.7): 1 - [phi]/2 + c [phi]², where c is (1 - angle/2 cot(angle/2)) / angle². The even part
+is the moment of inertia of the sensor, the odd part goes where the springs of markers have their pulls times arms.
+"""
+
+from __future__ import annotations
+
+from math import acos, pi, sqrt
+
+from osimlite.mechanics.kernels.layout import LINK_WORK
+from osimlite.mechanics.kernels.parts import link_work
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.points import direction
+from osimlite.mechanics.kernels.pose_record import (
+    MARKER_NUMBERS,
+    MARKERS,
+    MEASURED,
+    SENSOR_AT,
+    SENSOR_NUMBERS,
+    SENSORS,
+    TURNED,
+    WEIGHTS,
+    Fit,
+)
+from osimlite.mechanics.kernels.trigonometry import sine_cosine
+from osimlite.mechanics.laws.vectors import (
+    ZERO,
+    Vector,
+    along,
+    component,
+    cross,
+    dot,
+    elementwise,
+    minus,
+    plus,
+    put,
+    replaced,
+    times,
+    vector,
+)
+
+SMALL = 1e-3
+"""An angle (rad) from which on c is computed from it; below, 1/12 is as exact."""
+NEARLY_BACK = -0.99
+"""A cosine below which the axis of a turn follows from the even part of the rotation, for the odd part vanishes."""
+
+
+def sensors_turn(m: Fit) -> float:
+    """Put the springs of the sensors on the links; what they cost."""
+    model, data, p, v, value = m.model, m.data, m.p, m.v, 0.0
+    for k in range(p[SENSORS]):
+        weight, link = v[p[WEIGHTS] + p[MARKERS] + k], p[p[SENSOR_AT] + k]
+        if not weight > 0.0:
+            continue
+        off = turn_of(m, k)
+        square = dot(off, off)
+        value += 0.5 * weight * square
+        if link < 0:
+            continue
+        here = link_work(model, data, link)
+        i, load, turned = at(here, LINK_WORK.INERTIA), at(here, LINK_WORK.WRENCH), at(v, p[TURNED] + 9 * link)
+        x, y, z = times(weight * evenness(sqrt(square)), off)
+        a, b, c = off
+        i[4] += weight - (y * b + z * c)
+        i[5] += weight - (x * a + z * c)
+        i[6] += weight - (x * a + y * b)
+        i[7] += x * b
+        i[8] += x * c
+        i[9] += y * c
+        put(load, 0, along(vector(load, 0), weight, off))
+        a, b, c = times(0.5 * weight, off)
+        put(turned, 0, plus(vector(turned, 0), (0.0, -c, b)))
+        put(turned, 3, plus(vector(turned, 3), (c, 0.0, -a)))
+        put(turned, 6, plus(vector(turned, 6), (-b, a, 0.0)))
+    return value
+
+
+def evenness(angle: float) -> float:
+    """What stands before the square of the turn in the inverse Jacobian."""
+    if angle < SMALL:
+        return 1.0 / 12.0
+    sine, cosine = sine_cosine(0.5 * angle)
+    return (1.0 - 0.5 * angle * cosine / sine) / (angle * angle)
+
+
+def turn_of(m: Fit, sensor: int) -> Vector:
+    """The turn (rad, in ground) from the measured rotation of a sensor to the one that it has."""
+    rows = at(m.c, MARKER_NUMBERS * m.p[MARKERS] + SENSOR_NUMBERS * sensor)
+    wanted = at(m.v, m.p[MEASURED] + 3 * m.p[MARKERS] + 9 * sensor)
+    return turn_between(m.model, m.data, m.p[m.p[SENSOR_AT] + sensor], rows, wanted)
+
+
+def turn_between(model: Ints, data: Floats, link: int, rows: Floats, wanted: Floats) -> Vector:
+    """The turn (rad, in ground) that takes a wanted rotation to that of a frame of a link; both are given by rows."""
+    twist, diagonal = ZERO, ZERO
+    for k in range(3):
+        is_axis = direction(model, data, link, (rows[k], rows[3 + k], rows[6 + k]))
+        axis = wanted[k], wanted[3 + k], wanted[6 + k]
+        twist = plus(twist, cross(axis, is_axis))
+        diagonal = plus(diagonal, elementwise(axis, is_axis))
+    cosine, sine = 0.5 * (dot(diagonal, (1.0, 1.0, 1.0)) - 1.0), 0.5 * sqrt(dot(twist, twist))
+    if cosine < NEARLY_BACK:
+        return turn_back(model, data, link, rows, wanted, twist, diagonal)
+    if not sine > 1e-12:
+        return times(0.5, twist)
+    angle = acos(cosine) if cosine < 0.7 else sine_angle(sine)
+    return times(0.5 * angle / sine, twist)
+
+
+def turn_back(
+    model: Ints, data: Floats, link: int, rows: Floats, wanted: Floats, twist: Vector, diagonal: Vector
+) -> Vector:
+    """The same for nearly half a turn: its even part is twice the axis times itself."""
+    x, y, z = diagonal
+    axis = 0 if x >= y and x >= z else (1 if y >= z else 2)
+    row = ZERO
+    for k in range(3):
+        is_axis = direction(model, data, link, (rows[k], rows[3 + k], rows[6 + k]))
+        measured = wanted[k], wanted[3 + k], wanted[6 + k]
+        row = along(along(row, component(is_axis, axis), measured), component(measured, axis), is_axis)
+    cosine, sine = 0.5 * (x + y + z - 1.0), 0.5 * sqrt(dot(twist, twist))
+    row = minus(times(0.5, row), replaced(ZERO, axis, cosine))
+    length = sqrt(dot(row, row))
+    angle = pi - sine_angle(sine)
+    return times((angle if dot(row, twist) >= 0.0 else -angle) / length, row)
+
+
+def sine_angle(sine: float) -> float:
+    """The acute angle of a sine."""
+    return 0.5 * pi - acos(min(1.0, sine))

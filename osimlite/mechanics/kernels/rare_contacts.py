@@ -1,0 +1,122 @@
+"""Contact of ellipsoids, and Simbody's defect in contact of several surfaces."""
+
+from __future__ import annotations
+
+from math import inf
+
+from osimlite.mechanics.kernels.contacts import press
+from osimlite.mechanics.kernels.layout import CONTACT_WORK, ITEM, MODEL, OUTCOME
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.points import direction, station
+from osimlite.mechanics.laws.ellipsoid_contact import ellipsoid_ellipsoid, half_space_ellipsoid
+from osimlite.mechanics.laws.rotations import Axes
+from osimlite.mechanics.laws.vectors import dot, minus, put, vector
+
+
+def touch_ellipsoid(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """An ellipsoid on a half space; after the numbers of a pair stand the directions of its axes and half axes."""
+    i = at(model, item)
+    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
+    o, n = station(model, data, one, vector(p, 0)), direction(model, data, one, vector(p, 3))
+    center = station(model, data, two, vector(p, 7))
+    d, radius, point = half_space_ellipsoid(o, n, center, axes(model, data, two, at(p, 18)), vector(p, 27), p[12])
+    if d > 0.0:
+        press(model, reals, data, item, d, radius, n, point)
+    return OUTCOME.OK
+
+
+def touch_ellipsoids(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """Two ellipsoids, of which one may be a sphere; axes and half axes of both stand after the numbers of a pair."""
+    i = at(model, item)
+    one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
+    a, b = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 7))
+    way = minus(b, a)
+    if dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
+        return OUTCOME.OK
+    axes1, axes2 = axes(model, data, one, at(p, 18)), axes(model, data, two, at(p, 30))
+    d, radius, n, point = ellipsoid_ellipsoid(a, axes1, vector(p, 27), b, axes2, vector(p, 39), p[12])
+    if d > 0.0:
+        press(model, reals, data, item, d, radius, n, point)
+    return OUTCOME.OK
+
+
+def axes(model: Ints, data: Floats, link: int, p: Floats) -> Axes:
+    """The axes of an ellipsoid in ground."""
+    one, two = direction(model, data, link, vector(p, 0)), direction(model, data, link, vector(p, 3))
+    return one, two, direction(model, data, link, vector(p, 6))
+
+
+def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """All pairs of one force in Simbody's order, until one separates too fast to push.
+
+    The integers are the numbers of surfaces and pairs, the link of each surface, and the surfaces of each pair; the
+    numbers the centre and radius of each surface. Simbody sweeps along the axis of ground on which the centres lie
+    farthest apart (largest sum of distances from their mean), from the surface that begins first.
+    """
+    i = at(model, item)
+    count, pairs, links, p, room = (
+        i[ITEM.OWN],
+        i[ITEM.OWN + 1],
+        at(i, ITEM.OWN + 2),
+        at(reals, i[ITEM.NUMBERS]),
+        at(data, i[ITEM.RECORD]),
+    )
+    centers, start, order = room, at(room, 3 * count), at(room, 4 * count)
+    for k in range(count):
+        put(centers, 3 * k, station(model, data, links[k], vector(p, 4 * k)))
+    axis = 0
+    widest = -1.0
+    for side in range(3):
+        mean = spread = 0.0
+        for k in range(count):
+            mean += centers[3 * k + side]
+        mean /= count
+        for k in range(count):
+            spread += abs(centers[3 * k + side] - mean)
+        # Of the first two it is the second where they are equal.
+        if spread > widest or (side == 1 and spread == widest):
+            axis, widest = side, spread
+    for k in range(count):
+        start[k] = centers[3 * k + axis] - p[4 * k + 3]
+        place = k
+        while place > 0 and start[int(order[place - 1])] > start[k]:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = k
+    for position in range(count):
+        one = int(order[position])
+        for later in range(position + 1, count):
+            two = int(order[later])
+            if start[two] > centers[3 * one + axis] + p[4 * one + 3]:
+                break
+            if near(at(centers, 3 * one), at(centers, 3 * two), p[4 * one + 3], p[4 * two + 3]):
+                pair = pair_of(at(links, count), pairs, one, two)
+                if pair >= 0 and separates(
+                    model, reals, data, y, f, model[model[MODEL.CONTACT_AT] + i[ITEM.FIRST_CONTACT] + pair]
+                ):
+                    return OUTCOME.OK
+    return OUTCOME.OK
+
+
+def near(a: Floats, b: Floats, one: float, two: float) -> bool:
+    """Whether the bounding spheres of two surfaces are not apart; two half spaces never are a pair."""
+    if one == inf and two == inf:
+        return False
+    way = minus(vector(a, 0), vector(b, 0))
+    return dot(way, way) <= (one + two) * (one + two)
+
+
+def pair_of(surfaces: Ints, pairs: int, one: int, two: int) -> int:
+    """Number of the pair of two surfaces, -1 if they are none."""
+    for pair in range(pairs):
+        a, b = surfaces[2 * pair], surfaces[2 * pair + 1]
+        if (a == one and b == two) or (a == two and b == one):
+            return pair
+    return -1
+
+
+def separates(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, part: int) -> bool:
+    """Compute one contact; whether it touches and does not push."""
+    call(model[part + ITEM.LAW], model, reals, data, y, f, part)
+    result = at(data, model[part + ITEM.RECORD])
+    return bool(result[CONTACT_WORK.DEPTH] > 0.0 and result[0] == 0.0 and result[1] == 0.0 and result[2] == 0.0)

@@ -1,0 +1,182 @@
+"""What a run works on and writes down: reports, a log of its steps, events, peaks."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import NamedTuple
+
+from osimlite.mechanics.kernels.error_control import projected
+from osimlite.mechanics.kernels.layout import CONTACT_WORK, MODEL, STAGE, WORK
+from osimlite.mechanics.kernels.method import ACCEPTED
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.points import station
+from osimlite.mechanics.kernels.states import copy, cubic
+from osimlite.mechanics.laws.vectors import dot, vector
+
+DONE, FAILED, FULL, STOPPED, TOO_MANY = 0, 1, 2, 3, 4
+"""How a run ends: at its limit, at a state beyond which there is no step, with a full log, at an event that stops it,
+after as many tried steps as were allowed."""
+
+TIME_OF_EVENT = 1e-9
+"""How exactly the time of an event is found on the interpolated motion, s."""
+
+TAKEN, ATTEMPTED, EVALUATIONS, REPORTED, LOGGED, EVENTS, COUNTED = range(7)
+"""Indices of what a run counts: steps taken and attempted, evaluations, rows reported and logged, events."""
+
+COORDINATE, HEIGHT, TOUCH = 0, 1, 2
+"""Kinds of watches: on the value of a coordinate, on how far a point lies along a direction, on a contact."""
+
+STATES = 6
+"""Room for so many states that a run needs at WORK_STATE, and two numbers for each contact and watch after them."""
+
+MOST_TRIES, TIMES, MOST_EVENTS, EVENT, WATCHES, MOST_LOGGED = 0, 1, 2, 3, 4, 5
+"""Places of the sizes: steps that may be tried, how many rows there are and how long the row of an event is."""
+START_HOLDS, METHOD, METHOD_AT = 6, 7, 8
+"""Places of whether the constraints hold at the start, of the address of the method and of its place in `data`."""
+
+
+class Motion(NamedTuple):
+    """What a run works on and writes down; any of the records may have no rows.
+
+    A state has y numbers, see STATE_SIZE.
+    """
+
+    model: Ints  # the mechanism
+    reals: Floats  # its numbers
+    data: Floats  # room; at METHOD_AT the method's
+    sizes: Ints  # see MOST_TRIES
+    clock: Floats  # time and next step to try, s; changed
+    # steps taken, tried, evaluations, reports made, steps logged, events; changed. Events beyond the room for them
+    # are counted only.
+    counts: Ints
+    times: Floats  # of the reports, s (r,)
+    reports: Floats  # states at these times (r, y)
+    log: Floats  # of each step the time, y, f (k, 1 + 2y)
+    forces: Floats  # of each step the force on surface 2 of each pair (k, P, 3)
+    # time, number (of a contact, or P and the number of a watch), 1 if it begins or rises, else 0, and if there is
+    # room the state (e, 3 or 3 + y)
+    events: Floats
+    peaks: Floats  # largest force of each pair at the end of a step, and its time (P, 2)
+    # kind, degree of freedom or link or contact, and -1 or 1 if falling or rising through the level ends the run, 0
+    # if neither (w, 3)
+    watches: Ints
+    levels: Floats  # of each watch the station in the link, the direction in ground, and the level (w, 7)
+
+
+def evaluated(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int:
+    """Evaluate at a time."""
+    m.data[WORK.TIME] = t
+    return call(m.model[MODEL.LAWS], m.model, m.reals, m.data, y, f, stage)
+
+
+def inside(
+    m: Motion, t0: float, y0: Floats, f0: Floats, t1: float, y1: Floats, f1: Floats, t: float, y: Floats
+) -> None:
+    """State y at a time within a step, where the constraints hold if it can be moved there."""
+    cubic(m.model[MODEL.STATE_SIZE], t0, y0, f0, t1, y1, f1, t, y)
+    if m.model[MODEL.CONSTRAINED] > 0:
+        projected(m.model, m.reals, m.data, t, y, y, 0, m.data[m.sizes[METHOD_AT] + ACCEPTED] / 10.0, inf)
+
+
+def note_peaks(m: Motion, t: float) -> None:
+    """Keep the largest forces."""
+    for pair in range(m.model[MODEL.CONTACTS]):
+        c, peak = at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair), at(m.peaks, 2 * pair)
+        size = sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
+        if size > peak[0]:
+            peak[0], peak[1] = size, t
+
+
+def note_step(m: Motion, t: float, y: Floats, f: Floats) -> None:
+    """Write a step into the log."""
+    size, row = m.model[MODEL.STATE_SIZE], m.counts[LOGGED]
+    log = at(m.log, (1 + 2 * size) * row)
+    log[0] = t
+    copy(size, y, at(log, 1))
+    copy(size, f, at(log, 1 + size))
+    for pair in range(m.model[MODEL.CONTACTS]):
+        copy(
+            3,
+            at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair),
+            at(m.forces, 3 * (m.model[MODEL.CONTACTS] * row + pair)),
+        )
+    m.counts[LOGGED] += 1
+
+
+def levels_at(m: Motion, y: Floats, levels: Floats) -> None:
+    """Fill levels: of each contact 1 if it pushes, else -1; of each watch how far it is above its level."""
+    pairs = m.model[MODEL.CONTACTS]
+    for pair in range(pairs):
+        c = at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
+        levels[pair] = 1.0 if c[0] != 0.0 or c[1] != 0.0 or c[2] != 0.0 else -1.0
+    for number in range(m.sizes[WATCHES]):
+        watch, a = at(m.watches, 3 * number), at(m.levels, 7 * number)
+        if watch[0] == COORDINATE:
+            levels[pairs + number] = y[watch[1]] - a[6]
+        elif watch[0] == TOUCH:
+            levels[pairs + number] = levels[watch[1]]
+        else:
+            levels[pairs + number] = dot(station(m.model, m.data, watch[1], vector(a, 0)), vector(a, 3)) - a[6]
+
+
+def note_events(
+    m: Motion,
+    t0: float,
+    y0: Floats,
+    f0: Floats,
+    t1: float,
+    y1: Floats,
+    f1: Floats,
+    before: Floats,
+    after: Floats,
+) -> float:
+    """Write down what began and ended within a step; returns the time at which the run is to stop, or infinity."""
+    counts, events = m.counts, m.events
+    size, pairs = m.model[MODEL.STATE_SIZE], m.model[MODEL.CONTACTS]
+    stop, first, total, event = inf, counts[EVENTS], pairs + m.sizes[WATCHES], m.sizes[EVENT]
+    ya = at(m.data, m.model[MODEL.WORK_STATE] + 4 * size)
+    fa, result = at(ya, size), at(after, total)
+    for number in range(total):
+        rises = after[number] > 0.0
+        if rises == (before[number] > 0.0):
+            continue
+        low, high = t0, t1
+        while high - low > TIME_OF_EVENT:
+            middle = 0.5 * (low + high)
+            if not low < middle < high:
+                break
+            inside(m, t0, y0, f0, t1, y1, f1, middle, ya)
+            touch = number < pairs or m.watches[3 * (number - pairs)] == TOUCH
+            evaluated(m, middle, ya, fa, STAGE.FORCE if touch else STAGE.POSITION)
+            levels_at(m, ya, result)
+            if (result[number] > 0.0) == rises:
+                high = middle
+            else:
+                low = middle
+        t = 0.5 * (low + high)
+        if number >= pairs and m.watches[3 * (number - pairs) + 2] == (1 if rises else -1):
+            t = high
+            stop = min(stop, t)
+        row = insert(m, first, t, number, rises)
+        if row < m.sizes[MOST_EVENTS] and event > 3:
+            inside(m, t0, y0, f0, t1, y1, f1, t, at(events, event * row + 3))
+    # What lies behind the end of the run has not happened.
+    while counts[EVENTS] > first and counts[EVENTS] <= m.sizes[MOST_EVENTS]:
+        if events[event * (counts[EVENTS] - 1)] <= stop:
+            break
+        counts[EVENTS] -= 1
+    return stop
+
+
+def insert(m: Motion, first: int, t: float, number: int, rises: bool) -> int:
+    """Put an event among those of its step, by time; returns its row, which may lie beyond the room."""
+    row, events, length = int(m.counts[EVENTS]), m.events, m.sizes[EVENT]
+    m.counts[EVENTS] += 1
+    if row >= m.sizes[MOST_EVENTS]:
+        return row
+    while row > first and events[length * (row - 1)] > t:
+        copy(length, at(events, length * (row - 1)), at(events, length * row))
+        row -= 1
+    event = at(events, length * row)
+    event[0], event[1], event[2] = t, number, 1.0 if rises else 0.0
+    return row

@@ -1,0 +1,230 @@
+"""A whole motion in one call: steps of a method, reports, events.
+
+The rules are those of Simbody's AbstractIntegratorRep, rounding for rounding.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from osimlite.mechanics.kernels.error_control import projected
+from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE
+from osimlite.mechanics.kernels.method import (
+    ACCEPTED,
+    EVALUATED,
+    HAS_DERIVATIVE,
+    IS_EVALUATED,
+    LAST_TIME,
+    MEMORY,
+    NEXT_STEP,
+    REACHED,
+    SHORTEST,
+)
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.record import (
+    ATTEMPTED,
+    COUNTED,
+    DONE,
+    EVALUATIONS,
+    EVENT,
+    FAILED,
+    FULL,
+    LOGGED,
+    METHOD,
+    METHOD_AT,
+    MOST_EVENTS,
+    MOST_LOGGED,
+    MOST_TRIES,
+    REPORTED,
+    START_HOLDS,
+    STATES,
+    STOPPED,
+    TAKEN,
+    TIMES,
+    TOO_MANY,
+    WATCHES,
+    Motion,
+    evaluated,
+    inside,
+    levels_at,
+    note_events,
+    note_peaks,
+    note_step,
+)
+from osimlite.mechanics.kernels.states import copy, is_finite
+from osimlite.mechanics.kernels.step_sizes import shortest_step
+
+
+def run_several(
+    model: Ints,
+    reals: Floats,
+    data: Floats,
+    each: int,
+    sizes: Ints,
+    clocks: Floats,
+    counts: Ints,
+    states: Floats,
+    times: Floats,
+    reports: Floats,
+    log: Floats,
+    forces: Floats,
+    events: Floats,
+    peaks: Floats,
+    watches: Ints,
+    levels: Floats,
+    endings: Ints,
+    first: int,
+    last: int,
+) -> int:
+    """The runs `first` to `last` - 1, each on its own rows.
+
+    Args: as of `Motion`, one row for each run; a log, `data` and what tells how to run serve them all. `each` is the
+    length of a row of numbers, 0 if one serves them all.
+    """
+    for k in range(first, last):
+        m = run_of(model, reals, data, each, sizes, clocks, counts, states, times, reports, log, forces, events, peaks,
+                   watches, levels, k)  # fmt: skip
+        endings[k] = run(m, at(states, k * model[MODEL.STATE_SIZE]), False)
+    return OUTCOME.OK
+
+
+def run_of(
+    model: Ints,
+    reals: Floats,
+    data: Floats,
+    each: int,
+    sizes: Ints,
+    clocks: Floats,
+    counts: Ints,
+    states: Floats,
+    times: Floats,
+    reports: Floats,
+    log: Floats,
+    forces: Floats,
+    events: Floats,
+    peaks: Floats,
+    watches: Ints,
+    levels: Floats,
+    k: int,
+) -> Motion:
+    """One of several runs."""
+    size, pairs = model[MODEL.STATE_SIZE], model[MODEL.CONTACTS]
+    return Motion(
+        model,
+        at(reals, each * k),
+        data,
+        sizes,
+        at(clocks, 2 * k),
+        at(counts, COUNTED * k),
+        times,
+        at(reports, k * sizes[TIMES] * size),
+        log,
+        forces,
+        at(events, sizes[EVENT] * k * sizes[MOST_EVENTS]),
+        at(peaks, 2 * k * pairs),
+        watches,
+        levels,
+    )
+
+
+def run(m: Motion, y: Floats, is_going: bool) -> int:
+    """Go on from the state y, which is changed, until something ends the run.
+
+    Its derivative is that at the end of the run before if that goes on.
+    """
+    model, counts, clock, sizes = m.model, m.counts, m.clock, m.sizes
+    size = model[MODEL.STATE_SIZE]
+    room, h = at(m.data, model[MODEL.WORK_STATE]), at(m.data, sizes[METHOD_AT])
+    y0, f0, y1, f1 = room, at(room, size), at(room, 2 * size), at(room, 3 * size)
+    before = at(room, STATES * size)
+    after = at(before, model[MODEL.CONTACTS] + sizes[WATCHES])
+    is_kept = model[MODEL.CONSTRAINED] == 0 or sizes[START_HOLDS] > 0
+    if not is_kept and not projected(model, m.reals, m.data, clock[0], y, f0, 0, h[ACCEPTED] / 10.0, inf):
+        return FAILED
+    copy(size, y, y0)
+    status = OUTCOME.OK if is_going else evaluated(m, clock[0], y0, f0, STAGE.ACCELERATION)
+    if counts[TAKEN] == 0 and counts[EVALUATIONS] == 0:
+        counts[EVALUATIONS], h[MEMORY] = 0 if is_going else 1, 0.0
+    if status != OUTCOME.OK or not is_finite(size, f0):
+        return FAILED
+    h[IS_EVALUATED] = 0.0 if is_going else 1.0
+    levels_at(m, y0, before)
+    note_peaks(m, clock[0])
+    while counts[REPORTED] < sizes[TIMES] and m.times[counts[REPORTED]] <= clock[0]:
+        copy(size, y0, at(m.reports, size * counts[REPORTED]))
+        counts[REPORTED] += 1
+    while clock[0] < h[LAST_TIME]:
+        if sizes[MOST_LOGGED] > 0 and sizes[MOST_LOGGED] == counts[LOGGED]:
+            return FULL
+        t0 = clock[0]
+        t1 = step(m, t0, y0, y1)
+        if t1 <= t0:
+            return FAILED if t1 < t0 else TOO_MANY
+        if not is_evaluated(m, t1, y1, f1):
+            # Simbody ends here; smaller steps lead nearer to where the motion ends.
+            if t1 - t0 <= shortest_step(t0, counts[ATTEMPTED]):
+                return FAILED
+            clock[1] = max(0.1 * (t1 - t0), shortest_step(t0, counts[ATTEMPTED]))
+            h[MEMORY] = 0.0
+            continue
+        counts[TAKEN] += 1
+        clock[0] = t1
+        note_peaks(m, t1)
+        if sizes[MOST_LOGGED] > 0:
+            note_step(m, t1, y1, f1)
+        end, stopped = t1, False
+        h[IS_EVALUATED] = 1.0 if h[HAS_DERIVATIVE] == 0.0 and model[MODEL.CONSTRAINED] == 0 else 0.0
+        if sizes[MOST_EVENTS] > 0 or sizes[WATCHES] > 0:
+            h[IS_EVALUATED] = 0.0
+            levels_at(m, y1, after)
+            end = note_events(m, t0, y0, f0, t1, y1, f1, before, after)
+            stopped = end <= t1
+            end = min(end, t1)
+            copy(model[MODEL.CONTACTS] + sizes[WATCHES], after, before)
+        while counts[REPORTED] < sizes[TIMES] and m.times[counts[REPORTED]] <= end:
+            t, report = m.times[counts[REPORTED]], at(m.reports, size * counts[REPORTED])
+            if t == t1:
+                copy(size, y1, report)
+            else:
+                inside(m, t0, y0, f0, t1, y1, f1, t, report)
+            counts[REPORTED] += 1
+        if stopped:
+            if end < t1:
+                inside(m, t0, y0, f0, t1, y1, f1, end, y)
+            else:
+                copy(size, y1, y)
+            clock[0] = end
+            return STOPPED
+        y0, y1 = y1, y0
+        f0, f1 = f1, f0
+        copy(size, y0, y)
+    copy(size, f0, at(room, size))
+    return DONE
+
+
+def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
+    """Whether the end of a step has a derivative, which a method may have found where no forces are looked at."""
+    if m.data[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0 and m.model[MODEL.CONTACTS] + m.sizes[WATCHES] == 0:
+        return is_finite(m.model[MODEL.STATE_SIZE], f1)
+    m.counts[EVALUATIONS] += 1
+    return evaluated(m, t1, y1, f1, STAGE.ACCELERATION) == OUTCOME.OK and is_finite(m.model[MODEL.STATE_SIZE], f1)
+
+
+def step(m: Motion, t0: float, y0: Floats, y1: Floats) -> float:
+    """Find a step whose error is small enough: y1 and the time of its end; t0 - 1 if there is none, t0 if too many."""
+    counts, clock, sizes = m.counts, m.clock, m.sizes
+    h = at(m.data, sizes[METHOD_AT])
+    smallest = max(shortest_step(t0, counts[ATTEMPTED]), h[SHORTEST])
+    h[REACHED], h[NEXT_STEP] = t0, clock[1]
+    while counts[ATTEMPTED] < sizes[MOST_TRIES]:
+        tried = h[NEXT_STEP]
+        counts[ATTEMPTED] += 1
+        call(sizes[METHOD], m.model, m.reals, m.data, y0, y1, sizes[METHOD_AT])
+        counts[EVALUATIONS] += int(h[EVALUATED])
+        clock[1] = h[NEXT_STEP]
+        if h[REACHED] > t0:
+            return float(h[REACHED])
+        if tried <= smallest:
+            return t0 - 1.0
+        h[NEXT_STEP] = clock[1] = max(h[NEXT_STEP], smallest)
+    return t0

@@ -1,0 +1,139 @@
+"""Where a path runs on its surfaces, and where as a whole: for whoever draws it.
+
+Of each law of a surface there is one here that is called after it, with room for points as f: it writes points of
+ground between the two tangent points there, and returns how many they are.
+"""
+
+from __future__ import annotations
+
+from math import cos, isnan, nan, pi, sin, sqrt
+
+from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.kernels.path_wraps import BACK, BEST, POSE, WRAP_INTS, in_ground
+from osimlite.mechanics.kernels.paths import (
+    COUNT,
+    NODE_INTS,
+    NODE_WORK,
+    NODES_AT,
+    ORDER,
+    PLACE,
+    POINTS,
+    WRAPS,
+)
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
+from osimlite.mechanics.kernels.wrap_ellipsoid import around_axis, inverted
+from osimlite.mechanics.kernels.wrap_torus import in_cylinder, out_of_cylinder
+from osimlite.mechanics.kernels.wrapping import CURVE, FIRST_TANGENT, SECOND_TANGENT, SIZES
+from osimlite.mechanics.laws.vectors import (
+    Vector,
+    along,
+    cross,
+    dot,
+    elementwise,
+    put,
+    times,
+    unit,
+    vector,
+)
+
+ANGLE, MOST = 0.15, 60.0
+"""The angle (rad) between neighbouring points, at most, unless there are so many; the path then is 0.3 % of the radius
+below the surface."""
+FIRST, SECOND, SHAPE = BEST, BEST + SECOND_TANGENT - FIRST_TANGENT, BEST + CURVE - FIRST_TANGENT
+"""In the record of a surface: the tangent points, and what the law has told of the way between them."""
+
+
+def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """Write all corners of a path that was measured into f, in ground; returns how many there are.
+
+    After the wraps among the integers of the path stand the laws that trace it on each surface, or 0.
+    """
+    i, result = at(model, item), at(data, model[item + ITEM.RECORD])
+    points, wraps = i[POINTS], i[WRAPS]
+    size = points + 2 * wraps
+    order, work = at(result, ORDER), at(result, ORDER + size)
+    own = at(i, NODES_AT + NODE_INTS * size)
+    count = 0
+    for k in range(int(result[COUNT])):
+        number = int(order[k])
+        put(f, 3 * count, vector(work, NODE_WORK * number + PLACE))
+        count += 1
+        wrap = (number - points) // 2
+        if number >= points and number == points + 2 * wrap and own[WRAP_INTS * wraps + wrap] != 0:
+            surface = item - own[WRAP_INTS * wrap + BACK]
+            count += call(own[WRAP_INTS * wraps + wrap], model, reals, data, y, at(f, 3 * count), surface)
+    return count
+
+
+def pieces(angle: float) -> int:
+    """How many pieces a turn is drawn with."""
+    return int(min(1.0 + abs(angle) / ANGLE, MOST)) if not isnan(angle) else 1
+
+
+def trace_cylinder(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """A helix about z."""
+    e = at(data, model[item + ITEM.RECORD])
+    one, two, turn = vector(e, FIRST), vector(e, SECOND), e[SHAPE]
+    count = pieces(turn)
+    for k in range(1, count):
+        put(f, 3 * (k - 1), in_ground(at(e, POSE), on_helix(one, two, turn, k / count)))
+    return count - 1
+
+
+def trace_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """A helix on the cylinder in the place of the ring."""
+    p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
+    ring, outwards = p[SIZES + 1], (e[SHAPE + 1], e[SHAPE + 2], 0.0)
+    one, two = in_cylinder(vector(e, FIRST), outwards, ring), in_cylinder(vector(e, SECOND), outwards, ring)
+    count = pieces(e[SHAPE])
+    for k in range(1, count):
+        point = out_of_cylinder(on_helix(one, two, e[SHAPE], k / count), outwards, ring)
+        put(f, 3 * (k - 1), in_ground(at(e, POSE), point))
+    return count - 1
+
+
+def on_helix(one: Vector, two: Vector, turn: float, part: float) -> Vector:
+    """The point of a helix about z after a part of its way."""
+    x, y, z = one
+    _, _, end = two
+    c, s = cos(part * turn), sin(part * turn)
+    return c * x - s * y, s * x + c * y, z + part * (end - z)
+
+
+def trace_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """A great circle."""
+    e = at(data, model[item + ITEM.RECORD])
+    one, turn = vector(e, FIRST), e[SHAPE]
+    across = cross(unit(cross(one, vector(e, SECOND))), one)
+    count = pieces(turn)
+    for k in range(1, count):
+        angle = turn * k / count
+        put(f, 3 * (k - 1), in_ground(at(e, POSE), along(times(cos(angle), one), sin(angle), across)))
+    return count - 1
+
+
+def trace_ellipsoid(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """The section with the plane of the path; nothing where OpenSim's points are none."""
+    p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
+    a, b, c = vector(p, SIZES)
+    factor = 3.0 / (a + b + c)
+    one, two = times(factor, vector(e, FIRST)), times(factor, vector(e, SECOND))
+    centre, to_one, across, turn = around_axis(one, two, vector(e, SHAPE), e[SHAPE + 3])
+    turn -= 2.0 * pi * e[SHAPE + 4]
+    scale = times(1.0 / factor, inverted((a, b, c)))
+    count = pieces(turn)
+    for k in range(1, count):
+        angle = turn * k / count
+        way = along(times(cos(angle), to_one), sin(angle), across)
+        size = reach(elementwise(scale, centre), elementwise(scale, way))
+        if isnan(size):
+            return 0
+        put(f, 3 * (k - 1), in_ground(at(e, POSE), times(1.0 / factor, along(centre, size, way))))
+    return count - 1
+
+
+def reach(start: Vector, way: Vector) -> float:
+    """How many times a way leads from a point to the unit sphere, NaN if it misses that."""
+    square, half = dot(way, way), dot(start, way)
+    inner = half * half - square * (dot(start, start) - 1.0)
+    return (sqrt(inner) - half) / square if inner >= 0.0 else nan

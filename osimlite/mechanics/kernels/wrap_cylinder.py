@@ -1,0 +1,243 @@
+"""How a path bends around a cylinder about z.
+
+Both ends are joined to the surface by lines that touch its circle, as seen along the axis. How high these points lie
+comes from a plane through both ends and an apex on the surface; between them the path is a helix. So it is the shortest
+path only if it stays at one height, as in OpenSim.
+
+Source: OpenSim 4.6's WrapCylinder; for the choice of the tangents also B. A. Garner and M. G. Pandy, The obstacle-set
+method for representing muscle paths in musculoskeletal models, Computer Methods in Biomechanics and Biomedical
+Engineering 3, 2000.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, inf, pi, radians, sin, sqrt, tan
+
+from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.wrap_sides import action, nearest_pair, on_side, tangents
+from osimlite.mechanics.kernels.wrapping import (
+    ALONE,
+    AXIS,
+    CURVE,
+    FIRST_END,
+    FIRST_TANGENT,
+    INSIDE,
+    MANDATORY,
+    NONE,
+    SECOND_END,
+    SECOND_TANGENT,
+    SIDE,
+    SIZES,
+    SURFACE_LENGTH,
+)
+from osimlite.mechanics.laws.vectors import (
+    EPSILON,
+    Vector,
+    along,
+    cross,
+    dot,
+    minus,
+    plus,
+    put,
+    unit,
+    vector,
+)
+
+PARALLEL = 2e-13
+"""Squared sine of the angle between two lines up to which OpenSim takes them for parallel."""
+FLATTEST, FARTHEST = 5e-7, 10.0002
+"""The least part of a plane's normal along an edge that meets the plane, and how far along the edge that may be, m."""
+PIECE = 0.002
+"""Length of the pieces that OpenSim draws the helix with, m."""
+BEND, ROUNDS = tan(radians(0.1)), 100
+"""Tangent of the angle by which a line and the helix may differ where they meet; in so many rounds, at most."""
+
+
+def wrap_cylinder(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """The law of a WrapCylinder, see :mod:`osimlite.mechanics.kernels.wrapping`."""
+    p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
+    first, second = vector(e, FIRST_END), vector(e, SECOND_END)
+    return around_cylinder(first, second, p[SIZES], p[SIZES + 1], int(p[AXIS]), p[SIDE], p[ALONE] == 1.0, e)
+
+
+def around_cylinder(
+    first: Vector, second: Vector, radius: float, length: float, axis: int, side: float, alone: bool, e: Floats
+) -> int:
+    """The law of a cylinder, between two ends."""
+    px, py, pz = first
+    qx, qy, qz = second
+    if px * px + py * py < radius * radius or qx * qx + qy * qy < radius * radius:
+        return INSIDE
+    closest, crosses = closest_to_axis(first, second, radius)
+    if side != 0.0:
+        active = on_side(first, axis, side), on_side(second, axis, side)
+        code = action(*active, on_side(closest, axis, side), crosses)
+    else:
+        code = MANDATORY if crosses else NONE
+    if code == NONE:
+        return NONE
+
+    flat_first, flat_second = lifted(first, 0.0), lifted(second, 0.0)
+    a1, b1 = tangents(flat_first, radius, (0.0, 0.0, 1.0))
+    a2, b2 = tangents(flat_second, radius, (0.0, 0.0, 1.0))
+    if side == 0.0:
+        one, two = nearest_pair(a1, b1, a2, b2)
+        far = long = False
+    else:
+        # One way around the cylinder is from a to b, the other from b to a.
+        wide = dot(a1, b2) < dot(b1, a2)
+        from_a = starts_at_a(lifted(a1, pz), lifted(b1, pz), lifted(a2, qz), lifted(b2, qz), wide, axis, side)
+        one, two = (a1, b2) if from_a else (b1, a2)
+        far = from_a == wide
+        long = dot(plus(one, two), plus(minus(one, flat_first), minus(two, flat_second))) < 0.0
+
+    apex = apex_between(first, second, radius, far)
+    normal = unit(cross(minus(first, apex), minus(second, apex)))
+    z1, z2 = edge_height(one, pz, first, normal), edge_height(two, qz, first, normal)
+    if abs(qz) < EPSILON:
+        # OpenSim takes the foot of the second end for a direction, which it is none if that is the origin: then all
+        # heights count as that of the first end.
+        z1, z2 = pz, z2 if pz != qz else qz
+    else:
+        z1, z2 = z1 if abs(z1 - qz) < abs(pz - qz) else pz, z2 if abs(z2 - pz) < abs(qz - pz) else qz
+    if abs(z1) > 0.5 * length and abs(z2) > 0.5 * length:
+        return NONE
+    x1, y1, _ = one
+    x2, y2, _ = two
+    angle = atan2(x1 * y2 - y1 * x2, x1 * x2 + y1 * y2)
+    turn = angle
+    if long:
+        angle = 2.0 * pi - angle
+        turn = -angle
+    if not alone:
+        z1, z2 = settled(first, second, (x1, y1, z1), (x2, y2, z2), radius * angle, turn)
+    put(e, FIRST_TANGENT, (x1, y1, z1))
+    put(e, SECOND_TANGENT, (x2, y2, z2))
+    e[SURFACE_LENGTH], e[CURVE] = helix(radius * angle, z2 - z1), turn
+    return code
+
+
+def closest_to_axis(first: Vector, second: Vector, radius: float) -> tuple[Vector, bool]:
+    """The point of a line that is closest to the axis, and whether it is within the radius and between the ends."""
+    x, y, _ = first
+    dx, dy, dz = way = minus(second, first)
+    across = dx * dx + dy * dy
+    if across <= PARALLEL * (across + dz * dz):
+        return (0.0, 0.0, 0.0), False
+    part = -(x * dx + y * dy) / across
+    x, y, _ = closest = along(first, part, way)
+    return closest, x * x + y * y < radius * radius and 0.0 < part < 1.0
+
+
+def lifted(point: Vector, height: float) -> Vector:
+    """The point at a height above or below."""
+    x, y, _ = point
+    return x, y, height
+
+
+def starts_at_a(a1: Vector, b1: Vector, a2: Vector, b2: Vector, wide: bool, axis: int, side: float) -> bool:
+    """Whether the way from a1 to b2 is that on the active side, and not the way from b1 to a2.
+
+    If no point tells, it is so if that way is the wider one.
+    """
+    a_active = on_side(a1, axis, side)
+    if a_active != on_side(b1, axis, side):
+        return a_active
+    return not on_side(a2, axis, side) and (a_active or on_side(b2, axis, side) or wide)
+
+
+def apex_between(first: Vector, second: Vector, radius: float, far: bool) -> Vector:
+    """The point of the cylinder over which the path bends.
+
+    It is at the height of the point that divides the line between the ends as their distances from the axis, and in the
+    direction in which the plane through the ends and the axis at that height cuts across the cylinder; on the far side
+    of the axis if `far`.
+    """
+    px, py, pz = first
+    qx, qy, qz = second
+    d1, d2 = sqrt(px * px + py * py), sqrt(qx * qx + qy * qy)
+    x, y, z = along(first, d1 / (d1 + d2), minus(second, first))
+    nx, ny, _ = unit(cross((px, py, pz - z), (qx, qy, qz - z)))
+    ux, uy, _ = unit((-ny, nx, 0.0))
+    if (x * ux + y * uy > 0.0) == far:
+        ux, uy = -ux, -uy
+    return radius * ux, radius * uy, z
+
+
+def edge_height(point: Vector, own: float, end: Vector, normal: Vector) -> float:
+    """Height at which the edge of a tangent point meets a plane, or its own if that is nowhere near.
+
+    Args:
+        point: of the edge, which is parallel to the axis.
+        own: height of the end that the point belongs to, m.
+        end: a point of the plane.
+        normal: to the plane, the zero vector if there is no plane.
+    """
+    nx, ny, nz = normal
+    if abs(nz) < FLATTEST:
+        return own
+    dx, dy, _ = minus(end, point)
+    _, _, height = end
+    z = height + (dx * nx + dy * ny) / nz
+    return z if abs(z - own) <= FARTHEST else own
+
+
+def helix(arc: float, rise: float) -> float:
+    """Length of a helix."""
+    return sqrt(arc * arc + rise * rise)
+
+
+def settled(first: Vector, second: Vector, one: Vector, two: Vector, arc: float, turn: float) -> tuple[float, float]:
+    """Heights of the tangent points where the lines go over into the helix with almost no bend.
+
+    OpenSim compares with the next point that it would draw, so that the result jumps where their number changes. It
+    asks for this only if a path has several PathWraps, and need not come to an end.
+    """
+    x1, y1, z1 = one
+    x2, y2, z2 = two
+    pieces, part = 0, 0.0
+    leg1 = leg2 = (0.0, 0.0, 0.0, 0.0)
+    for _ in range(ROUNDS):
+        rise = z2 - z1
+        length = helix(arc, rise) / PIECE
+        if not 2.0 <= length < inf:
+            break
+        count = int(length)
+        if count != pieces:
+            pieces, part = count, 1.0 / count
+            c, s = cos(part * turn), sin(part * turn)
+            leg1 = leg(first, one, (c * x1 - s * y1, s * x1 + c * y1, 0.0))
+            leg2 = leg(second, two, (c * x2 + s * y2, c * y2 - s * x2, 0.0))
+        _, _, height1 = first
+        _, _, height2 = second
+        w1 = moved(leg1, height1, z1, z1 + part * rise)
+        # By now the helix has moved with its first point.
+        w2 = moved(leg2, height2, z2, w1 + (1.0 - part) * rise)
+        if w1 == z1 and w2 == z2:
+            break
+        z1, z2 = w1, w2
+    return z1, z2
+
+
+def leg(end: Vector, tangent: Vector, next_point: Vector) -> tuple[float, float, float, float]:
+    """What stays as a tangent point slides along its edge.
+
+    As seen along the axis, the lengths of the line to it and of the first piece of the helix; and by how much the
+    heights of the next point and of the end move it: 3/2 of the way to where its edge is closest to their line.
+    """
+    lx, ly, _ = minus(tangent, end)
+    nx, ny, _ = minus(next_point, tangent)
+    dx, dy, _ = minus(next_point, end)
+    across = dx * dx + dy * dy
+    share = (lx * dx + ly * dy) / across if across > 0.0 else 0.0
+    return sqrt(lx * lx + ly * ly), sqrt(nx * nx + ny * ny), 1.5 * share, 1.5 * (1.0 - share)
+
+
+def moved(leg: tuple[float, float, float, float], end: float, tangent: float, next_point: float) -> float:
+    """The next height of a tangent point from the three heights, the same if the path hardly bends there."""
+    line, piece, with_next, with_end = leg
+    line_rise, piece_rise = tangent - end, next_point - tangent
+    if abs(line * piece_rise - line_rise * piece) <= BEND * (line_rise * piece_rise + line * piece):
+        return tangent
+    return with_next * next_point + (with_end * end - 0.5 * tangent)

@@ -1,0 +1,303 @@
+"""How a path bends around an ellipsoid: in a plane through both ends and a point of the surface beside the chord.
+
+The plane is not that of the shortest path. Its point is found beside the middle of the chord, or where the chord passes
+a plane of symmetry, or by a fan of the shortest ways out of the ellipsoid from points of the chord. The tangent points
+are searched for in it by damped least squares which stop at 1e-4, so that the path has little bends there, as in
+OpenSim. All is in units in which the mean radius is 1.
+
+Source: OpenSim 4.6's WrapEllipsoid.
+"""
+
+from __future__ import annotations
+
+from math import acos, cos, isnan, nan, pi, sin, sqrt
+
+from osimlite.mechanics.kernels.closest_on_ellipsoid import closest_in_plane, closest_point, fan
+from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.wrap_sides import nowhere, on_side
+from osimlite.mechanics.kernels.wrapping import (
+    AXIAL,
+    AXIS,
+    CURVE,
+    FIRST_END,
+    FIRST_TANGENT,
+    INSIDE,
+    MANDATORY,
+    METHOD,
+    MIDPOINT,
+    NONE,
+    ROOM,
+    SECOND_END,
+    SECOND_TANGENT,
+    SIDE,
+    SIZES,
+    SURFACE_LENGTH,
+)
+from osimlite.mechanics.laws.vectors import (
+    Vector,
+    along,
+    component,
+    cross,
+    dot,
+    elementwise,
+    minus,
+    norm,
+    plus,
+    put,
+    replaced,
+    times,
+    unit,
+    vector,
+)
+
+CLOSE = 1e-4
+"""How far in units of :func:`height` an end counts as on the surface; 1 - cosine between ends in one direction."""
+ALL_FAN, NO_FAN, BORDER = 0.7073, 0.9, 0.3
+"""Cosines of the angle between chord and axis at which the fan counts wholly and not at all; the part of the chord at
+either end in which it comes to count."""
+PIECE, PIECES = 0.001, 499
+"""Length of the straight pieces that the path on the surface has in OpenSim (m), and how many it has at most."""
+EXACT, ROUNDS, TRIALS, STEPS = 1e-8, 50, 1000, 16.0
+"""Sum of squares at which the search for a tangent point ends, and after how many rounds; trials in each; the part of a
+step that is taken."""
+
+
+def wrap_ellipsoid(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """The law of a WrapEllipsoid, see :mod:`osimlite.mechanics.kernels.wrapping`."""
+    p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
+    a, b, c = vector(p, SIZES)
+    factor, axis, side = 3.0 / (a + b + c), int(p[AXIS]), p[SIDE]
+    radii = times(factor, (a, b, c))
+    first, second = times(factor, vector(e, FIRST_END)), times(factor, vector(e, SECOND_END))
+    first_height, second_height = height(radii, first), height(radii, second)
+    if first_height < -CLOSE or second_height < -CLOSE:
+        return INSIDE
+    way = minus(first, second)
+    enters, leaves = crossings(radii, second, way)
+    one, two = along(second, enters, way), along(second, leaves, way)
+    if abs(dot(unit(first), unit(second)) - 1.0) < CLOSE or not (enters < 1.0 and leaves > 0.0):
+        return NONE
+    support, by_fan, starts = support_point(p[METHOD], radii, one, minus(two, one), way, at(e, ROOM))
+    if starts:
+        one = two = support
+    if side != 0.0 and not on_side(support, axis, side):
+        outwards = -component(support, axis)
+        one = two = support = replaced(support, axis, outwards)
+        if by_fan > 0.0:
+            support = closest_point(radii, replaced(support, axis, outwards - by_fan * outwards))
+    normal = unit(cross(way, minus(first, support)))
+    offset = dot(normal, support)
+    one = tangent_point(radii, one, first, normal, offset) if abs(first_height) >= CLOSE else first
+    two = tangent_point(radii, two, second, normal, offset) if abs(second_height) >= CLOSE else second
+
+    length = norm(minus(one, two)) / factor
+    if isnan(length):
+        return nowhere(e, MANDATORY)
+    put(e, CURVE, normal)
+    e[CURVE + 3], e[CURVE + 4] = offset, 0.0
+    if length >= PIECE:
+        pieces = int(min(length / PIECE, 1.0 * PIECES))
+        length, next_one, next_two = curve(radii, one, two, normal, offset, pieces, False)
+        if side != 0.0 and pieces > 1 and (bends_back(first, one, next_one) or bends_back(second, two, next_two)):
+            length, _, _ = curve(radii, one, two, normal, offset, pieces, True)
+            e[CURVE + 4] = 1.0
+        length /= factor
+    put(e, FIRST_TANGENT, times(1.0 / factor, one))
+    put(e, SECOND_TANGENT, times(1.0 / factor, two))
+    e[SURFACE_LENGTH] = length
+    return MANDATORY
+
+
+def height(radii: Vector, point: Vector) -> float:
+    """(x/a)^2 + (y/b)^2 + (z/c)^2 - 1, negative inside."""
+    x, y, z = point
+    a, b, c = radii
+    return (x / a) * (x / a) + (y / b) * (y / b) + (z / c) * (z / c) - 1.0
+
+
+def inverted(a: Vector) -> Vector:
+    """One by each component."""
+    x, y, z = a
+    return 1.0 / x, 1.0 / y, 1.0 / z
+
+
+def crossings(radii: Vector, point: Vector, way: Vector) -> tuple[float, float]:
+    """The multiples of the way, the larger first, at which a line from a point meets the surface; NaN if nowhere."""
+    way, point = elementwise(inverted(radii), way), elementwise(inverted(radii), point)
+    a, b, c = dot(way, way), 2.0 * dot(way, point), dot(point, point) - 1.0
+    square = b * b - 4.0 * a * c
+    if not (square >= 0.0 and a > 0.0):
+        return nan, nan
+    return (sqrt(square) - b) / (2.0 * a), (-sqrt(square) - b) / (2.0 * a)
+
+
+def support_point(
+    method: float, radii: Vector, start: Vector, chord: Vector, way: Vector, room: Floats
+) -> tuple[Vector, float, bool]:
+    """The point beside the chord that sets the plane, how far the fan sets it, whether tangent points start there."""
+    middle = along(start, 0.5, chord)
+    if method == MIDPOINT:
+        return closest_point(radii, middle), 0.0, True
+    axis = longest(way)
+    passes = -component(start, axis) / component(chord, axis)
+    axial = closest_in_plane(radii, along(start, passes, chord), axis)
+    if method == AXIAL:
+        return axial, 0.0, 0.0 < passes < 1.0
+    cosine = abs(component(unit(way), axis))
+    fade = max(0.0, min(passes, 1.0 - passes) / BORDER)
+    if cosine > ALL_FAN and fade < 1.0:
+        cosine = ALL_FAN + fade * (cosine - ALL_FAN)
+    if cosine >= NO_FAN:
+        return axial, 0.0, True
+    fanned = closest_point(radii, plus(middle, fan(radii, start, chord, room)))
+    if cosine <= ALL_FAN:
+        return fanned, 1.0, True
+    part = (cosine - ALL_FAN) / (NO_FAN - ALL_FAN)
+    return closest_point(radii, along(times(part, axial), 1.0 - part, fanned)), 1.0 - part, True
+
+
+def longest(a: Vector) -> int:
+    """The axis with the largest component, by amount."""
+    x, y, z = a
+    if abs(z) > max(abs(x), abs(y)):
+        return 2
+    return 1 if abs(y) > abs(x) else 0
+
+
+def tangent_point(radii: Vector, start: Vector, end: Vector, normal: Vector, offset: float) -> Vector:
+    """The point of the surface in a plane whose tangent plane goes through an end, as it is found from a start on.
+
+    Four equations for the point r and a number d: r is in the plane and on the surface, and the end and r are in the
+    tangent plane n . x + d = 0 of r, n = (2 x / a a, 2 y / b b, 2 z / c c). OpenSim solves them by Levenberg's and
+    Marquardt's method in small steps, each of which is repeated at double length as long as that helps.
+    """
+    weights = inverted(elementwise(radii, radii))
+    by_end = times(2.0, elementwise(weights, end))
+    r, step, d_step = start, (0.0, 0.0, 0.0), 0.0
+    d = -2.0 * dot(elementwise(weights, r), r)
+    e0, e1, e2, e3 = misfits(weights, by_end, normal, offset, r, d)
+    error = before = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
+    damping = 0.01
+    for _ in range(ROUNDS):
+        if not error > EXACT:
+            break
+        n = times(2.0, elementwise(weights, r))
+        downhill = minus(times(-e0, normal), along(times(e1 + 2.0 * e2, n), e3, by_end))
+        cosine = dot(unit(minus(end, r)), unit(end))
+        size = (1.0 - cosine**100 if cosine > 0.1 else 1.0) / STEPS
+        for _ in range(TRIALS):
+            if not error >= before:
+                break
+            step, d_step = damped_step(normal, n, by_end, downhill, -e2 - e3, damping)
+            step, d_step = times(size, step), size * d_step
+            r, d = plus(r, step), d + d_step
+            e0, e1, e2, e3 = misfits(weights, by_end, normal, offset, r, d)
+            before, error = error, e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
+            damping *= 4.0
+        damping /= 8.0
+        longer = 0.5
+        for _ in range(TRIALS):
+            if not error <= before:
+                break
+            longer *= 2.0
+            r, d = along(r, longer, step), d + longer * d_step
+            e0, e1, e2, e3 = misfits(weights, by_end, normal, offset, r, d)
+            before, error = error, e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
+        r, d = along(r, -longer, step), d - longer * d_step
+        e0, e1, e2, e3 = misfits(weights, by_end, normal, offset, r, d)
+        before = error = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
+    return r
+
+
+def misfits(
+    weights: Vector, by_end: Vector, normal: Vector, offset: float, r: Vector, d: float
+) -> tuple[float, float, float, float]:
+    """What is left of the four equations."""
+    square = dot(elementwise(weights, r), r)
+    return dot(normal, r) - offset, square - 1.0, 2.0 * square + d, dot(by_end, r) + d
+
+
+def damped_step(
+    normal: Vector, n: Vector, by_end: Vector, downhill: Vector, d_downhill: float, damping: float
+) -> tuple[Vector, float]:
+    """The step of r and d: (J' J + damping D) step = downhill, where D is the diagonal of J' J.
+
+    The gradients of the four equations by r are the normal, n, 2 n and `by_end`, those by d are 0, 0, 1, 1.
+    """
+    px, py, pz = normal
+    nx, ny, nz = n
+    qx, qy, qz = by_end
+    more = 1.0 + damping
+    x = along(along(times(px, normal), 5.0 * nx, n), qx, by_end)
+    y = along(along(times(py, normal), 5.0 * ny, n), qy, by_end)
+    z = along(along(times(pz, normal), 5.0 * nz, n), qz, by_end)
+    x = replaced(x, 0, more * component(x, 0))
+    y = replaced(y, 1, more * component(y, 1))
+    z = replaced(z, 2, more * component(z, 2))
+    # Without d, and then by Cramer's rule.
+    mixed = along(by_end, 2.0, n)
+    bx, by, bz = times(-0.5 / more, mixed)
+    x, y, z = along(x, bx, mixed), along(y, by, mixed), along(z, bz, mixed)
+    rest = along(downhill, -0.5 / more * d_downhill, mixed)
+    yz, zx, xy = cross(y, z), cross(z, x), cross(x, y)
+    step = times(1.0 / dot(x, yz), (dot(rest, yz), dot(rest, zx), dot(rest, xy)))
+    return step, 0.5 / more * (d_downhill - dot(mixed, step))
+
+
+def curve(
+    radii: Vector, one: Vector, two: Vector, normal: Vector, offset: float, pieces: int, far: bool
+) -> tuple[float, Vector, Vector]:
+    """Length of a broken line on the surface, in a plane, and its points next to the two that it joins.
+
+    Its corners are at equal angles about the point where the plane meets the axis to which it is most normal.
+
+    Args:
+        radii: of the ellipsoid.
+        one: where it starts.
+        two: where it ends.
+        normal: unit normal n of the plane n . x = offset.
+        offset: of the plane.
+        pieces: of which it is made.
+        far: whether it goes the longer way around.
+    """
+    centre, a, b, angle = around_axis(one, two, normal, offset)
+    to_one, to_two = minus(one, centre), minus(two, centre)
+    # A corner is at centre + m (c a + s b), where c and s are cosine and sine of its angle: in the plane at m (c, s).
+    scale = inverted(radii)
+    u, v, w = elementwise(scale, a), elementwise(scale, b), elementwise(scale, centre)
+    uu, uv, vv, uw, vw, ww = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w), dot(w, w) - 1.0
+    piece = (angle - 2.0 * pi if far else angle) / pieces
+    c_piece, s_piece = cos(piece), sin(piece)
+    c, s, m, x, y, length = 1.0, 0.0, 0.0, norm(to_one), 0.0, 0.0
+    next_one = one
+    for k in range(1, pieces):
+        c, s = c * c_piece - s * s_piece, s * c_piece + c * s_piece
+        square, half = (uu * c + 2.0 * uv * s) * c + vv * s * s, uw * c + vw * s
+        inner = half * half - square * ww
+        m = (sqrt(inner) - half) / square if inner >= 0.0 else nan
+        length += sqrt((m * c - x) * (m * c - x) + (m * s - y) * (m * s - y))
+        x, y = m * c, m * s
+        if k == 1:
+            next_one = along(along(centre, x, a), y, b)
+    next_two = along(along(centre, x, a), y, b)
+    dx, dy = dot(to_two, a) - x, dot(to_two, b) - y
+    return length + sqrt(dx * dx + dy * dy), next_one, next_two
+
+
+def around_axis(one: Vector, two: Vector, normal: Vector, offset: float) -> tuple[Vector, Vector, Vector, float]:
+    """Where a plane meets the axis to which it is most normal, and how two points of it lie about that.
+
+    By unit vectors from there to the first and, square to that, towards the second, and by the angle between them.
+    """
+    axis = longest(normal)
+    across = component(normal, axis)
+    centre = replaced((0.0, 0.0, 0.0), axis, offset / across if across != 0.0 else nan)
+    a, b = unit(minus(one, centre)), unit(minus(two, centre))
+    cosine = dot(a, b)
+    return centre, a, cross(unit(cross(a, b)), a), acos(cosine) if abs(cosine) <= 1.0 else nan
+
+
+def bends_back(end: Vector, tangent: Vector, next_point: Vector) -> bool:
+    """Whether a path on the surface sets out towards the end that it comes from."""
+    return dot(minus(end, tangent), minus(next_point, tangent)) > 0.0

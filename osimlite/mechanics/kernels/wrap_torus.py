@@ -1,0 +1,179 @@
+"""How a path bends through the hole of a torus: as around a cylinder in the place of the ring where that is near.
+
+Source: OpenSim 4.6's WrapTorus. What it minimises there is not quite the distance from the ring, and it stops early; so
+the place is found with its very steps, those of MINPACK's lmdif (J. J. More, The Levenberg-Marquardt algorithm:
+implementation and theory, 1978) in one unknown.
+"""
+
+from __future__ import annotations
+
+from math import nan, sqrt
+
+from osimlite.mechanics.kernels.layout import ITEM
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at
+from osimlite.mechanics.kernels.wrap_cylinder import around_cylinder
+from osimlite.mechanics.kernels.wrap_sides import nowhere, on_side
+from osimlite.mechanics.kernels.wrapping import (
+    ALONE,
+    AXIS,
+    CURVE,
+    FIRST_END,
+    FIRST_TANGENT,
+    NONE,
+    SECOND_END,
+    SECOND_TANGENT,
+    SIDE,
+    SIZES,
+    WRAPPED,
+)
+from osimlite.mechanics.laws.vectors import (
+    Vector,
+    along,
+    cross,
+    dot,
+    minus,
+    norm,
+    put,
+    times,
+    vector,
+)
+
+LENGTH = 10_000.0
+"""Length of the cylinder that stands for the torus where the path touches it, m."""
+TOLERANCE, FIRST_RADIUS, EVALUATIONS = 1e-4, 0.2, 500
+"""Arguments of MINPACK's lmdif as OpenSim gives them: tolerance, factor of the first trust region, evaluations."""
+WORTHWHILE = 1e-4
+"""Part of the expected decrease that a step must bring."""
+STEP = 1e-5
+"""Step of the forward differences in the Jacobian, m."""
+DOWN = (0.0, 0.0, -1.0)
+
+
+def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
+    """The law of a WrapTorus about z, see :mod:`osimlite.mechanics.kernels.wrapping`; a piece never must wrap."""
+    p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
+    first, second, ring = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES + 1]
+    one, two = near_ring(first, second, ring), near_ring(second, first, ring)
+    closer = distance_from_ring(one, ring) < distance_from_ring(two, ring)
+    if p[SIDE] != 0.0:
+        one_active, two_active = on_side(one, int(p[AXIS]), p[SIDE]), on_side(two, int(p[AXIS]), p[SIDE])
+        if not (one_active or two_active):
+            return NONE
+        closer = one_active and (closer or not two_active)
+    rx, ry, _ = one if closer else two
+    distance = sqrt(rx * rx + ry * ry)
+    if not distance > 0.0:
+        return nowhere(e, WRAPPED)
+    outwards = (rx / distance, ry / distance, 0.0)
+    a, b = in_cylinder(first, outwards, ring), in_cylinder(second, outwards, ring)
+    if around_cylinder(a, b, p[SIZES], LENGTH, 0, 1.0, p[ALONE] == 1.0, e) <= NONE:
+        return nowhere(e, WRAPPED)
+    for place in (FIRST_TANGENT, SECOND_TANGENT):
+        put(e, place, out_of_cylinder(vector(e, place), outwards, ring))
+    e[CURVE + 1], e[CURVE + 2], _ = outwards
+    return WRAPPED
+
+
+def in_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
+    """A point in the frame of the cylinder that is in the place of the ring where a direction meets it.
+
+    Its x axis points to the middle of the torus, its y axis down, its z axis along the ring.
+    """
+    away, inwards = along(point, -ring, outwards), times(-1.0, outwards)
+    return dot(inwards, away), dot(DOWN, away), dot(cross(inwards, DOWN), away)
+
+
+def out_of_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
+    """A point of the frame of the cylinder in that of the torus."""
+    x, y, z = point
+    inwards = times(-1.0, outwards)
+    return along(along(along(times(ring, outwards), x, inwards), y, DOWN), z, cross(inwards, DOWN))
+
+
+def distance_from_ring(point: Vector, ring: float) -> float:
+    """Squared distance of a point from the ring."""
+    x, y, _ = point
+    return dot(point, point) + ring * ring - 2.0 * ring * sqrt(x * x + y * y)
+
+
+def near_ring(first: Vector, second: Vector, ring: float) -> Vector:
+    """The point of a line near to the ring, as it is found from the first end on."""
+    dx, dy, dz = minus(second, first)
+    distance = norm((dx, dy, dz))
+    if not distance > 0.0:
+        return nan, nan, nan
+    x, y, _ = first
+    dx, dy, _ = way = dx / distance, dy / distance, dz / distance
+    start, flat_start, flat, square = dot(first, way), x * dx + y * dy, dx * dx + dy * dy, x * x + y * y
+    return along(first, least_squares(start, flat_start, flat, square, ring), way)
+
+
+def residual(u: float, start: float, flat_start: float, flat: float, square: float, ring: float) -> float:
+    """What is to be zero at the nearest point, u from the first end: the slope of the squared distance from the ring.
+
+    OpenSim's second term is twice as large as that.
+    """
+    apart = u * u * flat + 2.0 * flat_start * u + square
+    if not apart > 0.0:
+        return nan
+    return 2.0 * start + 2.0 * u - 4.0 * ring * (flat * u + flat_start) / sqrt(apart)
+
+
+def least_squares(start: float, flat_start: float, flat: float, square: float, ring: float) -> float:
+    """Where the residual is smallest as lmdif finds it, from 0 on."""
+    u = damping = scale = 0.0
+    value, radius, moved, evaluations = residual(u, start, flat_start, flat, square, ring), FIRST_RADIUS, False, 1
+    while True:
+        slope = (residual(u + STEP, start, flat_start, flat, square, ring) - value) / STEP
+        if not abs(slope * value) > 0.0:
+            return u
+        scale = max(scale, abs(slope))
+        while True:
+            step, damping = damped_step(slope, value, scale, radius, damping)
+            size = scale * abs(step)
+            if not moved:
+                radius = min(radius, size)
+            next_value = residual(u + step, start, flat_start, flat, square, ring)
+            evaluations += 1
+            falls = 0.1 * abs(next_value) < abs(value)
+            actual = 1.0 - (next_value / value) ** 2 if falls else -1.0
+            linear, damped = (slope * step / value) ** 2, damping * (size / value) ** 2
+            predicted = linear + 2.0 * damped
+            ratio = actual / predicted if predicted != 0.0 else 0.0
+            if ratio <= 0.25:
+                part = 0.5 if actual >= 0.0 else 0.5 * (linear + damped) / (linear + damped - 0.5 * actual)
+                part = part if falls and part >= 0.1 else 0.1
+                radius, damping = part * min(radius, 10.0 * size), damping / part
+            elif damping == 0.0 or ratio >= 0.75:
+                radius, damping = 2.0 * size, 0.5 * damping
+            accepted = ratio >= WORTHWHILE
+            if accepted:
+                u, value, moved = u + step, next_value, True
+            small = abs(actual) <= TOLERANCE and predicted <= TOLERANCE and ratio <= 2.0
+            if small or radius <= TOLERANCE * scale * abs(u) or evaluations >= EVALUATIONS:
+                return u
+            if accepted:
+                break
+
+
+def damped_step(slope: float, value: float, scale: float, radius: float, damping: float) -> tuple[float, float]:
+    """A step that is hardly longer than a radius in units of 1 / scale, and the damping that makes it so.
+
+    MINPACK's lmpar, where neither slope nor value is zero.
+    """
+    step = -value / slope
+    over = abs(scale * step) - radius
+    if over <= 0.1 * radius:
+        return step, 0.0
+    least = over / radius * (slope / scale) ** 2
+    damping = min(max(damping, least), abs(slope * value) / scale / radius)
+    for last in range(10):
+        square = slope * slope + damping * scale * scale
+        step = -slope * value / square
+        over = abs(scale * step) - radius
+        if abs(over) <= 0.1 * radius or last == 9:
+            break
+        if over > 0.0:
+            least = max(least, damping)
+        damping = max(least, damping + over / radius * square / (scale * scale))
+    return step, damping

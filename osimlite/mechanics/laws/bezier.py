@@ -1,0 +1,257 @@
+"""Smooth curves of quintic Bezier sections, as OpenSim's SmoothSegmentedFunction has them; straight lines outside.
+
+A section is a corner: it leaves its first end along one line and reaches its second along another, and the more curvy
+it is, the nearer it comes to where the lines meet (M. Millard et al., Journal of Biomechanical Engineering 135, 2013,
+appendix A). Along it, x and y are polynomials in u, from 0 to 1.
+
+A curve is numbers, for `curve_value`: HEAD of all, where each section ends, and SECTION of each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from math import hypot
+
+from osimlite.mechanics.laws.carried import plain, settled
+
+Point = tuple[float, float, float]
+"""x, y, and the slope there."""
+Numbers = tuple[float, ...]
+"""Those of a curve."""
+
+SECTIONS, FIRST, LAST = 0, 1, 4
+HEAD = 7
+"""Count of the sections, and both ends, each as a `Point`."""
+START, SCALE, X, Y, STARTS = 0, 1, 2, 7, 13
+NODES = 64
+SECTION = STARTS + 2 * (NODES + 1)
+"""x at its first end, NODES over its width, the coefficients of x from u on and those of y, and at NODES + 1 places
+that are equally far from each other in x, where u is, and how far it would go up to the next at its rate there."""
+ROUNDS, NEAR = 20, 3e-6
+"""Halley's steps in the search for u; one that is so small is the last, since what it leaves is beyond rounding."""
+
+
+def curve_size(sections: int) -> int:
+    """How many numbers a curve of some sections has."""
+    return HEAD + (1 + SECTION) * sections
+
+
+def curve(points: Sequence[Point], curviness: Sequence[float]) -> Numbers:
+    """The numbers of a curve through points, with the curviness of the sections between them, each from 0 to 1.
+
+    Raises:
+        ValueError: the lines through two points do not meet in a corner between them.
+    """
+    sections = zip(points, points[1:], curviness, strict=False)
+    numbers = [x for item in sections for x in _section(*item)]
+    return (float(len(curviness)), *points[0], *points[-1], *(x for x, _, _ in points[1:]), *numbers)
+
+
+@lru_cache(maxsize=1024)
+def _section(first: Point, last: Point, curviness: float) -> Numbers:
+    """The numbers of a section."""
+    (x0, y0, slope0), (x1, y1, slope1) = first, last
+    if not 0.0 <= curviness <= 1.0:
+        raise ValueError("its curviness is not from 0 to 1")
+    # Where the lines meet.
+    x = (y1 - y0 - x1 * slope1 + x0 * slope0) / (slope0 - slope1) if abs(slope0 - slope1) > 2.0**-26 else (x1 + x0) / 2
+    y = (x - x1) * slope1 + y1
+    if not max(hypot(x - x0, y - y0), hypot(x - x1, y - y1)) < hypot(x1 - x0, y1 - y0):
+        raise ValueError(f"its slopes at {x0:g} and {x1:g} make no corner between these")
+    c = 0.1 + 0.8 * curviness
+    _, *of_x = _polynomial(x0, x0 + c * (x - x0), x1 + c * (x - x1), x1)
+    of_y = _polynomial(y0, y0 + c * (y - y0), y1 + c * (y - y1), y1)
+    return (x0, NODES / (x1 - x0), *of_x, *of_y, *_starts(of_x, x1 - x0))
+
+
+def _polynomial(p: float, q: float, r: float, s: float) -> tuple[float, ...]:
+    """Coefficients, by rising powers, for the control points p, q, q, r, r, s."""
+    return p, 5 * (q - p), 10 * (p - q), 10 * (r - p), 5 * (p + 2 * q - 3 * r), s - p + 5 * (r - q)
+
+
+def _starts(x: Sequence[float], width: float) -> list[float]:
+    """From where the search for u starts; it need not be exact."""
+    result: list[float] = []
+    u = step = 0.0
+    for node in range(NODES + 1):
+        low, high, u = u, 1.0, min(u + step, 1.0)
+        for _ in range(ROUNDS):
+            # Newton's method, or halves where it would leave the interval.
+            off, slope = _times_u(x, u) - width * node / NODES, _derivative(x, u)
+            low, high = (u, high) if off < 0.0 else (low, u)
+            before, u = u, u - off / slope if slope > 0.0 else -1.0
+            if not low <= u <= high:
+                u = 0.5 * (low + high)
+            if abs(u - before) < NEAR * NEAR:
+                break
+        slope = _derivative(x, u)
+        step = width / NODES / slope if slope > 0.0 else 0.0
+        result += [u, step]
+    return result
+
+
+def _times_u(x: Sequence[float], u: float) -> float:
+    return u * (x[0] + u * (x[1] + u * (x[2] + u * (x[3] + u * x[4]))))
+
+
+def _derivative(x: Sequence[float], u: float) -> float:
+    return x[0] + u * (2.0 * x[1] + u * (3.0 * x[2] + u * (4.0 * x[3] + u * 5.0 * x[4])))
+
+
+def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
+    """y and the slope of a curve; where x carries derivatives, y does, by the slope."""
+    if not x >= c[FIRST]:
+        return c[FIRST + 1] + c[FIRST + 2] * (x - c[FIRST]), c[FIRST + 2]
+    if x > c[LAST]:
+        return c[LAST + 1] + c[LAST + 2] * (x - c[LAST]), c[LAST + 2]
+    known = plain(x)
+    k, rest, u = first_place(c, known)
+    _, _, y, slope = on_section(c, k + X, 1, u, rest, ROUNDS)
+    return settled(y, slope * (known - x), 1.0), slope
+
+
+def first_place(c: Sequence[float], x: float) -> tuple[int, float, float]:
+    """The section of a curve that has x, by the place of its numbers, how far x is from its start, and u, nearly."""
+    count, number = int(c[SECTIONS]), 0
+    while number < count - 1 and x >= c[HEAD + number]:
+        number += 1
+    k = HEAD + count + SECTION * number
+    rest = x - c[k + START]
+    part = rest * c[k + SCALE]
+    node = min(int(part), NODES - 1)
+    part -= node
+    s = k + STARTS + 2 * node
+    u0, d0, u1, d1 = c[s], c[s + 1], c[s + 2], c[s + 3]
+    u = u0 + part * (d0 + part * (3.0 * (u1 - u0) - 2.0 * d0 - d1 + part * (2.0 * (u0 - u1) + d0 + d1)))
+    return k, rest, u
+
+
+def on_section(
+    c: Sequence[float], p: int, apart: int, u: float, rest: float, rounds: int
+) -> tuple[float, bool, float, float]:
+    """u after some steps of Halley's search for the only root, whether more are wanted, and y and the slope there.
+
+    Args:
+        c: where the coefficients of x and y are.
+        p: place of the first of these.
+        apart: how far the others are from one another.
+        u: where the search starts.
+        rest: how far x is from the start of the section.
+        rounds: steps at most.
+    """
+    goes_on = True
+    for _ in range(rounds):
+        u, goes_on = nearer_place(c, p, apart, u, rest)
+        if not goes_on:
+            break
+    y, slope = value_at(c, p, apart, u)
+    return u, goes_on, y, slope
+
+
+def nearer_place(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> tuple[float, bool]:
+    """u after a step, and whether more are wanted; the arguments are those of `on_section`."""
+    a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
+    # In halves, which a processor computes side by side.
+    v = u * u
+    off = u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
+    run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
+    bend = (b + u * (3.0 * d)) + v * (6.0 * e + u * (10.0 * f))
+    divisor = run * run - off * bend
+    leads_on = divisor > 0.0
+    step = off * run / (divisor if leads_on else 1.0)
+    u = min(max(u - step, 0.0), 1.0) if leads_on else u
+    return u, leads_on and not abs(step) < NEAR
+
+
+def value_at(c: Sequence[float], p: int, apart: int, u: float) -> tuple[float, float]:
+    """y and the slope at u; the arguments are those of `on_section`."""
+    a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
+    v, q = u * u, p + 5 * apart
+    g, h, i, j, k, m = c[q], c[q + apart], c[q + 2 * apart], c[q + 3 * apart], c[q + 4 * apart], c[q + 5 * apart]
+    run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
+    rise = (h + u * (2.0 * i)) + v * ((3.0 * j + u * (4.0 * k)) + v * (5.0 * m))
+    return (g + u * h) + v * ((i + u * j) + v * (k + u * m)), rise / run
+
+
+def missed(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> float:
+    """How far u is from the root; the arguments are those of `on_section`."""
+    a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
+    v = u * u
+    return u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
+
+
+def value_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tuple[float, float]:
+    """y of a curve where ``of_y * y + of_x * x`` is a total, and how far the sum is from that.
+
+    On a section the sum is a polynomial in u, too, which rises with a rising curve and positive factors.
+    """
+    end = end_of_sum(c, of_y, of_x, total)
+    if end > 0:
+        return beyond_sum(c, of_y, of_x, total, end), total - total
+    k, rest, u = first_place_of_sum(c, of_y, of_x, total)
+    # As numbers in a row, which on_section takes.
+    own = (
+        of_y * c[k + Y + 1] + of_x * c[k + X],
+        of_y * c[k + Y + 2] + of_x * c[k + X + 1],
+        of_y * c[k + Y + 3] + of_x * c[k + X + 2],
+        of_y * c[k + Y + 4] + of_x * c[k + X + 3],
+        of_y * c[k + Y + 5] + of_x * c[k + X + 4],
+        c[k + Y],
+        c[k + Y + 1],
+        c[k + Y + 2],
+        c[k + Y + 3],
+        c[k + Y + 4],
+        c[k + Y + 5],
+    )
+    u, _, y, _ = on_section(own, 0, 1, u, rest, ROUNDS)
+    return y, missed(own, 0, 1, u, rest)
+
+
+def end_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> int:
+    """The end of a curve that a sum is beyond, FIRST or LAST; 0 if neither."""
+    if not total >= of_y * c[FIRST + 1] + of_x * c[FIRST]:
+        return FIRST
+    return LAST if total > of_y * c[LAST + 1] + of_x * c[LAST] else 0
+
+
+def beyond_sum(c: Sequence[float], of_y: float, of_x: float, total: float, end: int) -> float:
+    """y beyond an end of a curve."""
+    x, y, slope = c[end], c[end + 1], c[end + 2]
+    return y + slope * ((total - (of_y * y + of_x * x)) / (of_y * slope + of_x))
+
+
+def first_place_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tuple[int, float, float]:
+    """As `first_place` of a sum: its section, how far it is from what it is at its start, and u, roughly."""
+    count, number = int(c[SECTIONS]), 0
+    k = HEAD + count
+    start = of_y * c[k + Y] + of_x * c[k + START]
+    end = of_y * c[LAST + 1] + of_x * c[LAST]
+    while number < count - 1:
+        following = k + SECTION
+        knot = of_y * c[following + Y] + of_x * c[following + START]
+        if not total >= knot:
+            end = knot
+            break
+        k, start, number = following, knot, number + 1
+    return k, total - start, (total - start) / (end - start)
+
+
+def curve_integral(c: Sequence[float], x: float) -> float:
+    """Integral of a curve from its first end to x; exact, while OpenSim's is a spline good to about 1e-9."""
+    total, off = 0.0, x - c[FIRST]
+    if off <= 0.0:
+        return (c[FIRST + 1] + 0.5 * c[FIRST + 2] * off) * off
+    at, rest, u = first_place(c, min(x, c[LAST]))
+    u, *_ = on_section(c, at + X, 1, u, rest, ROUNDS)
+    for k in range(HEAD + int(c[SECTIONS]), at, SECTION):
+        total += _area(c, k, 1.0)
+    total += _area(c, at, u)
+    off = max(x - c[LAST], 0.0)
+    return total + (c[LAST + 1] + 0.5 * c[LAST + 2] * off) * off
+
+
+def _area(c: Sequence[float], k: int, u: float) -> float:
+    """Integral of y over x of a section up to u."""
+    x, y = c[k + X : k + Y], c[k + Y : k + STARTS]
+    return sum(b * j * a * u ** (i + j) / (i + j) for i, b in enumerate(y) for j, a in enumerate(x, 1))

@@ -1,0 +1,107 @@
+"""Elastic foundation: a mesh covered by a layer of springs, one at the middle of every triangle.
+
+A spring acts while its middle is inside the other surface. It then pushes along the way from the middle to the nearest
+point of that surface, at that point; its opposite acts on the other surface at the same point. All vectors are in one
+frame of the caller's choice, ground as a rule.
+
+Sources: K. L. Johnson, "Contact Mechanics" (1985), section 4.3, for the foundation; damping and friction in the form
+that Simbody's ElasticFoundationForce gives them (the friction is that of :mod:`osimlite.mechanics.laws.hunt_crossley`).
+"""
+
+from __future__ import annotations
+
+from osimlite.mechanics.laws.hunt_crossley import friction
+from osimlite.mechanics.laws.vectors import (
+    ZERO,
+    Vector,
+    along,
+    cross,
+    dot,
+    minus,
+    norm,
+    over,
+    plus,
+    times,
+)
+
+
+def spring_in_half_space(o: Vector, n: Vector, middle: Vector) -> tuple[float, Vector]:
+    """Depth of the middle of a spring in a half space, and the nearest point of the plane.
+
+    Args:
+        o: point on the plane, m.
+        n: unit normal of the plane, out of the half space, 1.
+        middle: of the spring, m.
+
+    Returns:
+        Depth and point, m. The spring acts where the depth is positive.
+    """
+    d = dot(minus(o, middle), n)
+    return d, along(middle, d, n)
+
+
+def spring_in_sphere(center: Vector, r: float, middle: Vector) -> tuple[float, Vector]:
+    """Depth of the middle of a spring in a sphere, and the nearest point of the sphere.
+
+    In the very centre no point is nearest, so that the spring does not act.
+
+    Args:
+        center: of the sphere, m.
+        r: its radius, m.
+        middle: of the spring, m.
+
+    Returns:
+        Depth and point, m. The spring acts where the depth is positive.
+    """
+    way = minus(middle, center)
+    distance = norm(way)
+    return (r - distance, along(center, r / distance, way)) if distance > 0.0 else (0.0, center)
+
+
+def spring_load(
+    k: float,
+    c: float,
+    us: float,
+    ud: float,
+    uv: float,
+    vt: float,
+    middle: Vector,
+    end: Vector,
+    about: Vector,
+    v: Vector,
+    turning: Vector,
+) -> tuple[Vector, Vector, float]:
+    """Force of one spring on the mesh at the nearest point of the other surface, its torque about a point, its energy.
+
+    With d the way from the middle to the end and v the velocity there, of which vn is along d: f = k |d| (1 + c vn)
+    along d, nothing where that is not positive; and f mu along the slip, mu being its `friction`. The energy is
+    k |d|^2 / 2.
+
+    Args:
+        k: stiffness of the layer times area of the triangle, N/m.
+        c: dissipation, s/m.
+        us: coefficient as of :func:`osimlite.mechanics.laws.hunt_crossley.friction`, with ud and uv.
+        vt: transition velocity, m/s.
+        middle: of the spring, m.
+        end: nearest point of the other surface, m.
+        about: point for torque and velocity, m.
+        v: velocity of the other surface relative to the mesh there, m/s.
+        turning: its angular velocity relative to the mesh, 1/s.
+
+    Returns:
+        Force, N; torque, N·m; energy, J.
+    """
+    way = minus(end, middle)
+    d = norm(way)
+    if d == 0.0:
+        return ZERO, ZERO, 0.0
+    energy, n, arm = 0.5 * k * d * d, over(way, d), minus(end, about)
+    here = plus(v, cross(turning, arm))
+    vn = dot(here, n)
+    f = k * d * (1.0 + c * vn)
+    if f <= 0.0:
+        return ZERO, ZERO, energy
+    slip = along(here, -vn, n)
+    w = norm(slip)
+    force = along(times(f, n), f * friction(w, us, ud, uv, vt) / w if w > 0.0 else 0.0, slip)
+    return force, cross(arm, force), energy

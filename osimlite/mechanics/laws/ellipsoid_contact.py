@@ -1,0 +1,163 @@
+"""Where an ellipsoid touches a half space or another ellipsoid; the force is that of
+:mod:`osimlite.mechanics.laws.hunt_crossley`.
+
+Source: Simbody's collision detection. Its effective radius in a half space comes from the curvatures of the section
+through the centre of the ellipsoid parallel to the plane, and is that of the sphere for three equal half axes.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+from osimlite.mechanics.laws.rotations import Axes
+from osimlite.mechanics.laws.vectors import (
+    ZERO,
+    Vector,
+    along,
+    cross,
+    dot,
+    elementwise,
+    minus,
+    norm,
+    over,
+    plus,
+    times,
+)
+
+
+def half_space_ellipsoid(
+    o: Vector, n: Vector, center: Vector, axes: Axes, radii: Vector, a: float
+) -> tuple[float, float, Vector]:
+    """Depth, effective radius and point of application of an ellipsoid (surface 2) in a half space (surface 1).
+
+    Args:
+        o: point on the plane, m.
+        n: unit normal of the plane, out of the half space, 1.
+        center: of the ellipsoid, m.
+        axes: of the ellipsoid, 1.
+        radii: half axes, m.
+        a: part of the depth that is the half space's, 1.
+
+    Returns:
+        d, R and P, m. They touch where d > 0; otherwise -d is the gap and the rest means nothing.
+    """
+    one, two, three = axes
+    rx, ry, rz = radii
+    # The normal along the axes of the ellipsoid, times the half axes.
+    u = dot(n, one) * rx, dot(n, two) * ry, dot(n, three) * rz
+    reach = norm(u)
+    d = reach - dot(minus(center, o), n)
+    if d <= 0.0:
+        return d, 0.0, ZERO
+    lx, ly, lz = over(times(-1.0, elementwise(u, radii)), reach)
+    point = along(along(along(center, lx, one), ly, two), lz, three)
+    # The product of the curvatures of the section is (reach / (rx ry rz))^2.
+    return d, sqrt(rx * ry * rz / reach), along(point, d * (1.0 - a), n)
+
+
+def ellipsoid_ellipsoid(
+    c1: Vector, axes1: Axes, radii1: Vector, c2: Vector, axes2: Axes, radii2: Vector, a: float
+) -> tuple[float, float, Vector, Vector]:
+    """Depth, effective radius, normal and point of application of two ellipsoids, of which one may be a sphere.
+
+    The normal n is the direction in which the overlap h(n) = s1 + s2 - n (c2 - c1) is least, with c the centres and s
+    the distances from them to the planes that touch the ellipsoids across n. It is found by Newton's method from the
+    line of the centres. Ellipsoids with one centre have no normal and do not touch. The effective radius is
+    1 / sqrt(k k'), with k and k' the principal curvatures of one surface relative to the other.
+
+    Args:
+        c1: centre of the ellipsoid that is surface 1, m; c2 likewise.
+        axes1: of it, 1; axes2 likewise.
+        radii1: its half axes, m; radii2 likewise.
+        a: part of the depth that is surface 1's, 1.
+
+    Returns:
+        d, R, n and P: d, R and the point in m; n, 1. They touch where d > 0; otherwise there is a gap, and the rest
+        means nothing.
+    """
+    way = minus(c2, c1)
+    distance = norm(way)
+    if distance == 0.0:
+        return 0.0, 0.0, ZERO, ZERO
+    n = over(way, distance)
+    squares1, squares2 = elementwise(radii1, radii1), elementwise(radii2, radii2)
+    tries, least, known, step = 0, inf, n, ZERO
+    while True:
+        g1, g2 = stretched(axes1, squares1, n), stretched(axes2, squares2, n)
+        s1, s2 = sqrt(dot(g1, n)), sqrt(dot(g2, n))
+        h = s1 + s2 - dot(n, way)
+        if h <= 0.0:
+            # A plane across n parts the two.
+            return h, 0.0, ZERO, ZERO
+        tries += 1
+        if h > least * (1.0 + 1e-12) and tries < 100:
+            # Too long a step: half of it.
+            step = times(0.5, step)
+            n = plus(known, step)
+            n = over(n, norm(n))
+            continue
+        least, known = h, n
+        g1, g2 = over(g1, s1), over(g2, s2)
+        u, v = across(n)
+        gu1, gv1, huu1, huv1, hvv1 = slopes(axes1, squares1, g1, s1, u, v)
+        gu2, gv2, huu2, huv2, hvv2 = slopes(axes2, squares2, g2, s2, u, v)
+        # How fast the overlap grows along u and v.
+        fu, fv = gu1 + gu2 - dot(way, u), gv1 + gv2 - dot(way, v)
+        if fu * fu + fv * fv <= 1e-26 * (s1 + s2) * (s1 + s2) or tries >= 100:
+            break
+        huu, huv, hvv = huu1 + huu2 - h, huv1 + huv2, hvv1 + hvv2 - h
+        if huu <= 0.0 or huu * hvv - huv * huv <= 0.0:
+            # Deep within each other the overlap is no bowl; without what bends it down it is.
+            huu += h
+            hvv += h
+        determinant = huu * hvv - huv * huv
+        step = along(times((huv * fv - hvv * fu) / determinant, u), (huv * fu - huu * fv) / determinant, v)
+        n = plus(known, step)
+        n = over(n, norm(n))
+    one, two = huu1 * hvv1 - huv1 * huv1, huu2 * hvv2 - huv2 * huv2
+    huv = huv1 + huv2
+    R = sqrt(one * two / ((huu1 + huu2) * (hvv1 + hvv2) - huv * huv))
+    return h, R, n, along(plus(c1, g1), -a * h, n)
+
+
+def stretched(axes: Axes, squares: Vector, x: Vector) -> Vector:
+    """B x, with the squares of an ellipsoid's half axes as a matrix B.
+
+    s = sqrt(n B n) is the way to the plane that touches it across n, and B n / s leads to the point where it does.
+
+    Args:
+        axes: of the ellipsoid.
+        squares: of the half axes, m^2.
+        x: a vector.
+    """
+    one, two, three = axes
+    p, q, r = squares
+    return along(along(times(p * dot(one, x), one), q * dot(two, x), two), r * dot(three, x), three)
+
+
+def across(n: Vector) -> tuple[Vector, Vector]:
+    """Unit vectors u and v across the unit vector n and each other."""
+    nx, ny, nz = n
+    u = (0.0, nz, -ny) if abs(nx) < 0.6 else (-nz, 0.0, nx)
+    u = over(u, norm(u))
+    return u, cross(n, u)
+
+
+def slopes(
+    axes: Axes, squares: Vector, g: Vector, s: float, u: Vector, v: Vector
+) -> tuple[float, float, float, float, float]:
+    """First and second derivatives of s = sqrt(n B n) as n turns towards u and v.
+
+    Args:
+        axes: of the ellipsoid, whose B is that of `stretched`.
+        squares: of the half axes, m^2.
+        g: the gradient of s, B n / s, m.
+        s: m.
+        u: unit vector across n, 1; v likewise.
+
+    Returns:
+        (gu, gv, huu, huv, hvv), m.
+    """
+    gu, gv = dot(g, u), dot(g, v)
+    bu, bv = stretched(axes, squares, u), stretched(axes, squares, v)
+    return gu, gv, (dot(bu, u) - gu * gu) / s, (dot(bu, v) - gu * gv) / s, (dot(bv, v) - gv * gv) / s

@@ -1,0 +1,190 @@
+"""Hunt-Crossley contact with friction: half space against sphere, sphere against sphere.
+
+Every contact has a surface 1 and a surface 2 (of a half space and a sphere, the half space is surface 1). The
+unit normal n points from 1 to 2, d is the depth of the overlap, v = v1 - v2 the velocity of the material of
+surface 1 relative to that of surface 2 at the point of application P. The laws return the force on surface 2
+at P; its opposite acts on surface 1 at P. All vectors are in one frame of the caller's choice, ground as a
+rule.
+
+Sources: K. H. Hunt and F. R. E. Crossley, "Coefficient of restitution interpreted as damping in vibroimpact",
+Journal of Applied Mechanics 42 (1975) 440-445 (dissipation proportional to the elastic force); H. Hertz
+(1881) for the elastic force; M. Hollars' friction curve in the form that Simbody's HuntCrossleyForce gives it
+(friction proportional to slip below the transition velocity, Stribeck fall from static to dynamic friction
+above it, and a viscous part).
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from osimlite.mechanics.laws.vectors import ZERO, Vector, along, dot, minus, norm, over, times
+
+
+def combine_materials(
+    K1: float, c1: float, us1: float, ud1: float, uv1: float, K2: float, c2: float, us2: float, ud2: float, uv2: float
+) -> tuple[float, float, float, float, float, float]:
+    """Effective parameters of a pair of surfaces, to be computed once per pair.
+
+    With k_i = K_i^(2/3), a = k2 / (k1 + k2) of the depth is surface 1's: the softer surface yields more. A
+    surface of stiffness 0 (the default of the property) yields without resistance, so that k = 0 and the
+    pair exerts no force; that holds for two such surfaces also, where OpenSim 4.6 divides 0 by 0.
+
+    Args:
+        K1: stiffness property of surface 1 (a plane-strain modulus), Pa; K2 likewise. Not negative.
+        c1: dissipation, s/m; c2 likewise.
+        us1: coefficient of static friction, 1; us2 likewise.
+        ud1: coefficient of dynamic friction, 1; ud2 likewise.
+        uv1: coefficient of viscous friction, s/m; uv2 likewise.
+
+    Returns:
+        (k, a, c, us, ud, uv): k as `contact_force` takes it, Pa^(2/3); a, 1; c, s/m; us and ud, 1; uv, s/m.
+        The coefficients of friction are harmonic means, so that one frictionless surface makes the pair
+        frictionless.
+
+    Raises:
+        ValueError: a stiffness is negative. The caller knows the component's name and says so in its own
+            words.
+    """
+    if K1 < 0.0 or K2 < 0.0:
+        raise ValueError("a contact stiffness must not be negative")
+    k1 = K1 ** (2.0 / 3.0)
+    k2 = K2 ** (2.0 / 3.0)
+    a = k2 / (k1 + k2) if k1 + k2 > 0.0 else 0.5
+    us = 2.0 * us1 * us2 / (us1 + us2) if us1 + us2 != 0.0 else 0.0
+    ud = 2.0 * ud1 * ud2 / (ud1 + ud2) if ud1 + ud2 != 0.0 else 0.0
+    uv = 2.0 * uv1 * uv2 / (uv1 + uv2) if uv1 + uv2 != 0.0 else 0.0
+    return k1 * a, a, c1 * a + c2 * (1.0 - a), us, ud, uv
+
+
+def half_space_sphere(o: Vector, n: Vector, center: Vector, r: float, a: float) -> tuple[float, Vector]:
+    """Depth and point of application of a sphere (surface 2) in a half space (surface 1).
+
+    The half space has no bottom: a centre far below its plane gives a depth greater than 2 r. R of the pair
+    is r.
+
+    Args:
+        o: point on the plane, m.
+        n: unit normal of the plane, out of the half space, 1.
+        center: of the sphere, m.
+        r: radius of the sphere, m.
+        a: part of the depth that is the half space's, from `combine_materials`, 1.
+
+    Returns:
+        d and P, m. They touch where d > 0; otherwise -d is the gap and the point means nothing.
+    """
+    s = dot(minus(center, o), n)
+    d = r - s
+    return (d, along(center, -(s + a * d), n)) if d > 0.0 else (d, ZERO)
+
+
+def sphere_sphere(c1: Vector, r1: float, c2: Vector, r2: float, a: float) -> tuple[float, float, Vector, Vector]:
+    """Depth, effective radius, normal and point of application of two spheres.
+
+    Spheres with one and the same centre have no normal and, as in Simbody, do not touch.
+
+    Args:
+        c1: centre of the sphere that is surface 1, m; c2 likewise.
+        r1: its radius, m; r2 likewise.
+        a: part of the depth that is surface 1's, from `combine_materials`, 1.
+
+    Returns:
+        d, R = r1 r2 / (r1 + r2), n and P: d, R and the point in m; n, 1. They touch where d > 0; otherwise -d is the
+        gap (0 for one centre) and the rest means nothing.
+    """
+    way = minus(c2, c1)
+    distance = norm(way)
+    d = r1 + r2 - distance
+    if d <= 0.0 or distance == 0.0:
+        return min(d, 0.0), 0.0, ZERO, ZERO
+    n = over(way, distance)
+    return d, r1 * r2 / (r1 + r2), n, along(c1, r1 - a * d, n)
+
+
+def friction(w: float, us: float, ud: float, uv: float, vt: float) -> float:
+    """Coefficient of friction at a slip w: min(r, 1) (ud + 2 (us - ud) / (1 + r^2)) + uv w, with r = w / vt.
+
+    At w = vt it is us + uv vt and has a kink. With us < ud / 2 it is negative for small r: friction then drives the
+    slip instead of opposing it.
+
+    Args:
+        w: slip, m/s, greater than 0.
+        us: coefficient of static friction, 1.
+        ud: coefficient of dynamic friction, 1.
+        uv: coefficient of viscous friction, s/m.
+        vt: transition velocity, m/s. Where it is 0 (or less), the coefficient is ud + uv w, the limit for vt -> 0.
+    """
+    if not vt > 0.0:
+        return ud + uv * w
+    r = w / vt
+    mu = ud + 2.0 * (us - ud) / (1.0 + r * r)
+    return (r * mu if r < 1.0 else mu) + uv * w
+
+
+def contact_force(
+    d: float, R: float, k: float, c: float, us: float, ud: float, uv: float, vt: float, n: Vector, v: Vector
+) -> Vector:
+    """Force on surface 2 at the point of application.
+
+    f = (4/3) k d sqrt(R k d) (1 + (3/2) c vn) along n, nothing where that is not positive (no contact pulls); and f mu
+    along the slip of surface 1 over surface 2, mu being its `friction`.
+
+    Args:
+        d: depth, m; no force where d <= 0.
+        R: effective radius of curvature, m.
+        k: effective stiffness from `combine_materials`, Pa^(2/3); no force where it is 0.
+        c: effective dissipation, s/m.
+        us: effective coefficient as of `friction`, with ud and uv.
+        vt: transition velocity, m/s.
+        n: unit normal from surface 1 to surface 2, 1.
+        v: velocity of surface 1 relative to surface 2 at the point of application, m/s.
+
+    Returns:
+        Force, N. A depth or velocity that is not a number gives a force that is not a number.
+    """
+    if d <= 0.0:
+        return ZERO
+    vn = dot(v, n)
+    f = (4.0 / 3.0) * k * d * sqrt(R * k * d) * (1.0 + 1.5 * c * vn)
+    if f <= 0.0:
+        return ZERO
+    slip = along(v, -vn, n)
+    w = norm(slip)
+    if w == 0.0:
+        return times(f, n)
+    return along(times(f, n), f * friction(w, us, ud, uv, vt) / w, slip)
+
+
+def contact_derivatives(
+    d: float, R: float, k: float, c: float, us: float, ud: float, uv: float, vt: float, n: Vector, v: Vector
+) -> tuple[float, float, float]:
+    """How the force of `contact_force`, whose arguments these are, changes where surfaces are pressed and slip.
+
+    Returns:
+        Of the force along n its derivatives by the depth (N/m) and by the approach v n (N s/m), and the force across n
+        over the slip (N s/m); all 0 where there is no force.
+    """
+    if d <= 0.0:
+        return 0.0, 0.0, 0.0
+    vn = dot(v, n)
+    elastic = (4.0 / 3.0) * k * d * sqrt(R * k * d)
+    f = elastic * (1.0 + 1.5 * c * vn)
+    if f <= 0.0:
+        return 0.0, 0.0, 0.0
+    # Without slip it is the limit: the coefficient grows in proportion.
+    w = max(norm(along(v, -vn, n)), 1e-6 * vt, 1e-12)
+    return 1.5 * f / d, 1.5 * c * elastic, f * friction(w, us, ud, uv, vt) / w
+
+
+def contact_energy(d: float, R: float, k: float) -> float:
+    """Potential energy of the elastic part, (8/15) k d^2 sqrt(R k d), in J.
+
+    Its derivative with respect to d is the elastic force of Hertz, (4/3) k d sqrt(R k d).
+
+    Args:
+        d: depth, m; no energy where d <= 0.
+        R: effective radius of curvature, m.
+        k: effective stiffness from `combine_materials`, Pa^(2/3).
+    """
+    if d <= 0.0:
+        return 0.0
+    return (8.0 / 15.0) * k * d * d * sqrt(R * k * d)

@@ -1,0 +1,224 @@
+"""The muscle of M. Millard et al. with a mass between fibers and tendon, as OpenSim's Millard2012AccelerationMuscle.
+
+Forces are parts of the maximum isometric force F; the curves are those of :mod:`osimlite.mechanics.laws.muscle_curves`. Each
+elastic force has a damper that raises it by the normalized velocity times a factor; what pulls never pushes thereby,
+nor the other way round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
+from typing import NamedTuple
+
+from osimlite.mechanics.laws.bezier import LAST, curve_integral, curve_value
+from osimlite.mechanics.laws.muscles import (
+    SIGNIFICANT,
+    MuscleInputs,
+    cos_pennation,
+    fiber_length_along,
+    first_order_activation_rate,
+)
+
+ROUNDS, STEP = 500, 0.75
+"""Steps in the search for an equilibrium, each of this part of Newton's."""
+
+
+class Millard2012Acceleration(NamedTuple):
+    """The numbers of a muscle."""
+
+    strength: float  # max_isometric_force F, N
+    optimal: float  # optimal_fiber_length, m
+    slack: float  # tendon_slack_length, m
+    fastest: float  # max_contraction_velocity, 1/s
+    mass: float  # kg
+    tendon_damping: float  # tendon_force_length_damping, s, as all of them
+    short_damping: float  # fiber_compressive_force_length_damping
+    passive_damping: float  # fiber_force_length_damping
+    steep_damping: float  # fiber_compressive_force_cos_pennation_damping
+    fiber_damping: float  # over F
+    rising: float  # activation time constant, s
+    falling: float  # deactivation time constant, s
+    least: float  # activation that the rate knows
+    height: float  # as of `pennation`, with the three that follow
+    shortest: float
+    largest_sin: float
+    least_cos: float
+    optimal_cos: float  # of pennation at optimal length
+
+
+class AccelerationCurves(NamedTuple):
+    """The curves of a muscle, as `curve_value` takes them."""
+
+    active: Sequence[float]  # active force over fiber length
+    velocity: Sequence[float]  # factor of the active force over fiber velocity
+    passive: Sequence[float]  # passive force over fiber length
+    tendon: Sequence[float]  # force over tendon length
+    short: Sequence[float]  # force against short fibers over their length
+    steep: Sequence[float]  # force against steep fibers over the cosine of pennation
+
+
+class Moment(NamedTuple):
+    """What fibers, tendon and the mass between them do."""
+
+    cos: float  # of pennation
+    by_length: float  # active force at rest, fully activated
+    by_velocity: float  # factor of the active force by velocity
+    passive: float  # what fibers bear besides the active force, N
+    tension: float  # of the tendon, N
+    acceleration: float  # of the fiber length, m/s^2
+    slope: float  # its derivative over fiber length at the same speeds, 1/s^2
+    stiffness: float  # of the fibers along the tendon, N/m
+    tendon_stiffness: float  # N/m
+
+
+def moment(
+    m: Millard2012Acceleration,
+    active: float,
+    fiber: float,
+    velocity: float,
+    tendon: float,
+    rate: float,
+    curves: AccelerationCurves,
+) -> Moment:
+    """What there is at a fiber length; see calcAccelerationMuscleInfo and calcMuscleDynamicsInfo of OpenSim's class.
+
+    Args:
+        m: the muscle.
+        active: activation.
+        fiber: length of the fibers, m.
+        velocity: of it, m/s.
+        tendon: length of the tendon, m.
+        rate: of it, m/s.
+        curves: of the muscle.
+    """
+    cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
+    sin = m.height / fiber
+    tan = sin / cos
+    turning, turn = -velocity / fiber * tan, -tan / fiber
+    along = velocity * cos - fiber * sin * turning
+    turning_slope = velocity / (fiber * fiber) * tan - velocity / fiber * (1.0 + tan * tan) * turn
+    along_slope = -velocity * sin * turn - sin * turning - fiber * cos * turn * turning - fiber * sin * turning_slope
+    by_length, active_slope = curve_value(curves.active, fiber / m.optimal)
+    by_velocity, _ = curve_value(curves.velocity, velocity / (m.fastest * m.optimal))
+
+    pull, pull_slope = curve_value(curves.tendon, tendon / m.slack)
+    damped = max(1.0 + m.tendon_damping * rate / m.slack, 0.0)
+    tension, tendon_stiffness = m.strength * pull * damped, m.strength * pull_slope / m.slack * damped
+    stretch, stretch_slope = curve_value(curves.passive, fiber / m.optimal)
+    short, short_slope = curve_value(curves.short, fiber / m.optimal)
+    stretched = max(1.0 + m.passive_damping * velocity / m.optimal, 0.0)
+    shortened = max(1.0 - m.short_damping * velocity / m.optimal, 0.0)
+    steep, steep_slope = curve_value(curves.steep, cos)
+    normal = m.steep_damping / (m.optimal * m.optimal_cos)
+    steepened = max(1.0 - normal * along, 0.0)
+    steep_slope = -steep_slope * sin * turn * steepened - (steep * normal * along_slope if steepened > 0.0 else 0.0)
+
+    passive = stretch * stretched - short * shortened + m.fiber_damping * velocity / m.optimal
+    borne = active * by_length * by_velocity + passive
+    borne_slope = active * active_slope * by_velocity + stretch_slope * stretched - short_slope * shortened
+    net = tension - m.strength * (borne * cos - steep * steepened)
+    stiffness = m.strength * (borne_slope / m.optimal * cos - borne * sin * turn - steep_slope)
+    acceleration = net * cos / m.mass + fiber * turning * turning
+    net_slope = tendon_stiffness * (fiber * sin * turn - cos) - stiffness
+    slope = (net_slope * cos - net * sin * turn) / m.mass + turning * turning + 2.0 * fiber * turning * turning_slope
+    # What damps the fibers themselves is no passive force to OpenSim.
+    told = m.strength * (stretch * stretched - short * shortened - steep * steepened * cos)
+    stiffness /= cos - fiber * sin * turn
+    return Moment(cos, by_length, by_velocity, told, tension, acceleration, slope, stiffness, tendon_stiffness)
+
+
+def millard2012_acceleration(
+    now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
+) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
+    """The muscle at a moment. The activation is bounded in its rate only, and fibers may be of any length.
+
+    Returns:
+        Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by length and by
+        velocity, active and passive fiber force (N), whether the fibers are longer than the muscle is wide, rate of
+        activation (1/s), fiber velocity (m/s) and its rate (m/s^2).
+    """
+    fiber_length, velocity = now.fiber_length, now.fiber_velocity
+    cos = cos_pennation(fiber_length, m.height, m.shortest, m.largest_sin, m.least_cos)
+    tendon, rate = now.length - fiber_length * cos, now.rate - velocity / cos
+    at = moment(m, now.activation, fiber_length, velocity, tendon, rate, curves)
+    pull = now.activation * at.by_length * at.by_velocity * m.strength
+    change = first_order_activation_rate(now.excitation, now.activation, m.rising, m.falling, m.least)
+    return (
+        at.tension,
+        now.activation,
+        fiber_length,
+        at.cos,
+        at.by_length,
+        at.by_velocity,
+        pull,
+        at.passive,
+        fiber_length > m.height,
+        change,
+        velocity,
+        at.acceleration,
+    )
+
+
+def millard2012_acceleration_rigid(now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves) -> float:
+    """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim."""
+    fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
+    if not fiber > m.shortest:
+        return 0.0
+    cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
+    by_length, _ = curve_value(curves.active, fiber / m.optimal)
+    by_velocity, _ = curve_value(curves.velocity, now.rate * cos / (m.optimal * m.fastest))
+    return m.strength * by_length * by_velocity * cos
+
+
+def millard2012_acceleration_equilibrium(
+    now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
+) -> tuple[bool, float, float]:
+    """Whether there is a fiber length that is not accelerated, that length (m), and its velocity (m/s).
+
+    Step for step as in initMuscleState of OpenSim's class: parts of Newton's steps, while the rate of the path is
+    shared between fibers and tendon by their stiffness. Where the slope vanishes, OpenSim goes on somewhere at random;
+    here the search ends. It ends, as there, where a tendon without stiffness becomes taut.
+    """
+    length, rate = now.length, now.rate
+    tolerance, tendon, tendon_rate = max(1e-8 * m.strength, 10.0 * SIGNIFICANT), 1.01 * m.slack, 0.0
+    fiber = fiber_length_along(length - tendon, m.height, m.shortest, m.least_cos)
+    for _ in range(ROUNDS):
+        if not fiber > m.height:
+            break
+        cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
+        velocity = (rate - tendon_rate) * cos
+        at = moment(m, now.activation, fiber, velocity, tendon, tendon_rate, curves)
+        if abs(at.acceleration) <= tolerance:
+            return True, fiber, velocity
+        if not SIGNIFICANT < abs(at.slope) < inf:
+            break
+        fiber = max(fiber - STEP * at.acceleration / at.slope, m.shortest)
+        tendon = length - fiber * cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
+        both, tendon_rate = at.stiffness + at.tendon_stiffness, rate
+        if tendon > m.slack and abs(both) > SIGNIFICANT:
+            if at.tendon_stiffness == 0.0:
+                break
+            tendon_rate = at.stiffness / both * rate
+    return False, fiber, now.fiber_velocity
+
+
+def millard2012_acceleration_energy(
+    m: Millard2012Acceleration, length: float, fiber_length: float, cos: float, curves: AccelerationCurves
+) -> float:
+    """Potential energy, J; the energy of the mass is not counted.
+
+    Args:
+        m: the muscle.
+        length: of the path, m.
+        fiber_length: m.
+        cos: of pennation.
+        curves: of the muscle.
+    """
+    short, steep = curves.short, curves.steep
+    stretched = curve_integral(curves.passive, fiber_length / m.optimal)
+    shortened = curve_integral(short, short[LAST]) - curve_integral(short, fiber_length / m.optimal)
+    pulled = curve_integral(curves.tendon, (length - fiber_length * cos) / m.slack)
+    steepened = curve_integral(steep, steep[LAST]) - curve_integral(steep, cos)
+    # As in OpenSim, the last has no length by which it would be an energy.
+    return m.strength * (m.optimal * (stretched + shortened) + m.slack * pulled + steepened)

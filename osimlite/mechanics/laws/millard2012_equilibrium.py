@@ -1,0 +1,361 @@
+"""The muscle of M. Millard et al. (Journal of Biomechanical Engineering 135, 2013) without a mass between its parts.
+
+As OpenSim's Millard2012EquilibriumMuscle has it: with or without damping of the fibers, with an elastic or a rigid
+tendon, with or without dynamics of activation. Forces are parts of the maximum isometric force F, fiber lengths of the
+optimal fiber length, fiber velocities of the maximum contraction velocity times that length, tendon lengths of the
+tendon slack length. The curves are those of :mod:`osimlite.mechanics.laws.muscle_curves`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isnan, nan
+from typing import NamedTuple
+
+from osimlite.mechanics.laws.bezier import curve_integral, curve_value, value_of_sum
+from osimlite.mechanics.laws.carried import plain, settled
+from osimlite.mechanics.laws.muscles import (
+    SIGNIFICANT,
+    MuscleInputs,
+    cos_pennation,
+    fiber_length_along,
+    first_order_activation_rate,
+)
+
+LENGTH_ROUNDS = 200
+"""Newton's steps in the search for an equilibrium."""
+VELOCITY_TOLERANCE = 1e-10
+"""What a velocity may leave of a force that is to be zero, as part of the strength; nearly always it is rounding."""
+NONE, DAMPED, INVERSE, RIGID, SLACK = 0.0, 1.0, 2.0, 3.0, 4.0
+"""What tells the velocity: nothing, a sum with damping, the inverse curve; it is known and tells the force, or is 0."""
+SMALLEST = 2.0**-26
+"""Least part of a step, and the step (m) in the other direction where there is none."""
+
+
+class Millard2012Equilibrium(NamedTuple):
+    """The numbers of a muscle."""
+
+    strength: float  # max_isometric_force F, N
+    optimal: float  # optimal_fiber_length, m
+    slack: float  # tendon_slack_length, m
+    fastest: float  # max_contraction_velocity, 1/s
+    rising: float  # activation_time_constant, s
+    falling: float  # deactivation_time_constant, s
+    is_rigid: float  # ignore_tendon_compliance, 1 or 0
+    is_excited: float  # ignore_activation_dynamics, 1 or 0: the excitation is the activation
+    damping: float  # of the fibers, over F; 0 if they have none
+    least: float  # activation
+    height: float  # as of `pennation`, with the three that follow
+    shortest: float
+    largest_sin: float
+    least_cos: float
+    smallest: float  # fiber length that the curves and pennation allow, m
+
+
+class MillardCurves(NamedTuple):
+    """The curves of a muscle, as `curve_value` takes them."""
+
+    active: Sequence[float]  # active force over fiber length
+    velocity: Sequence[float]  # factor of the active force over fiber velocity
+    inverse: Sequence[float]  # roughly the inverse of that
+    passive: Sequence[float]  # passive force over fiber length
+    tendon: Sequence[float]  # force over tendon length
+
+
+class Fibers(NamedTuple):
+    """What is known of a muscle; before a curve was asked, its argument stands where its value will."""
+
+    told_by: float  # see NONE
+    velocity: float
+    by_velocity: float  # factor of the active force
+    active: float  # activation
+    length: float  # of the fibers, m
+    cos: float  # of pennation
+    by_length: float  # active force at rest, fully activated
+    elastic: float  # passive force
+    tendon: float  # its force
+    change: float  # rate of activation, 1/s
+
+
+def millard2012_equilibrium(
+    now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
+) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
+    """The muscle at a moment; see calcFiberVelocityInfo and calcMuscleDynamicsInfo of OpenSim's class.
+
+    Fibers at their least length stay there as long as they would shorten, and bear nothing then. A rigid tendon does
+    not bear pressure: the damping of fast fibers is bounded instead.
+
+    Returns:
+        Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by length and by
+        velocity, active and passive fiber force (N), whether a fiber velocity was found, rate of activation (1/s),
+        fiber velocity (m/s), what of the passive force is not by damping (N).
+    """
+    fibers = fibers_resting(now, m, curves)
+    is_found, velocity, by_velocity = fibers.told_by != NONE, fibers.velocity, fibers.by_velocity
+    if fibers.told_by == RIGID:
+        by_velocity, _ = curve_value(curves.velocity, velocity)
+    elif fibers.told_by == DAMPED:
+        is_found, velocity, by_velocity = damped_velocity(
+            m, fibers.active, fibers.by_length, fibers.elastic, fibers.tendon, fibers.cos, curves
+        )
+    elif fibers.told_by == INVERSE:
+        velocity, _ = curve_value(curves.inverse, velocity)
+    return muscle_with(fibers, m, is_found, velocity, by_velocity, fibers.by_length, fibers.elastic, fibers.tendon)
+
+
+def millard2012_again(
+    now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves, fiber_velocity: float
+) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
+    """The same, where the velocity (m/s) that damped fibers have is known, so that its derivatives are all to find."""
+    fibers = fibers_resting(now, m, curves)
+    velocity = plain(fiber_velocity) / (m.fastest * m.optimal) if fibers.told_by == DAMPED else fibers.velocity
+    by_velocity, slope = 1.0, 0.0
+    if fibers.told_by == INVERSE:
+        velocity, _ = curve_value(curves.inverse, velocity)
+    else:
+        by_velocity, slope = curve_value(curves.velocity, velocity)
+    if fibers.told_by == DAMPED:
+        share = fibers.active * fibers.by_length
+        off = share * by_velocity + m.damping * velocity - fibers.velocity
+        velocity = settled(velocity, off, share * slope + m.damping)
+    by_length, elastic, tendon = fibers.by_length, fibers.elastic, fibers.tendon
+    return muscle_with(fibers, m, True, velocity, by_velocity, by_length, elastic, tendon)
+
+
+def fibers_resting(now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves) -> Fibers:
+    """The fibers when the curves over length were asked, those over velocity not."""
+    fibers, tendon = fibers_at(now, m), 0.0
+    by_length, _ = curve_value(curves.active, fibers.by_length)
+    elastic, _ = curve_value(curves.passive, fibers.by_length)
+    if not m.is_rigid:
+        tendon, _ = curve_value(curves.tendon, fibers.tendon)
+    velocity, by_velocity, by_length, elastic, tendon = fibers_loaded(fibers, m, by_length, elastic, tendon)
+    told_by, active, length, cos, change = fibers.told_by, fibers.active, fibers.length, fibers.cos, fibers.change
+    return Fibers(told_by, velocity, by_velocity, active, length, cos, by_length, elastic, tendon, change)
+
+
+def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> Fibers:
+    """The fibers at a moment, before any curve was asked."""
+    active = min(max(now.excitation if m.is_excited else now.activation, m.least), 1.0)
+    fiber = now.fiber_length
+    if m.is_rigid:
+        fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
+    fiber = max(fiber, m.smallest)
+    cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
+    along_tendon = now.length - fiber * cos
+    told_by, velocity, tendon = DAMPED if m.damping > 0.0 else INVERSE, 0.0, 0.0
+    if m.is_rigid:
+        told_by = SLACK
+        if along_tendon >= m.slack - SIGNIFICANT:
+            told_by, velocity = RIGID, now.rate * cos / (m.optimal * m.fastest)
+    else:
+        tendon = along_tendon / m.slack
+    if not cos > SIGNIFICANT:
+        told_by = NONE
+    change = first_order_activation_rate(now.excitation, now.activation, m.rising, m.falling, m.least)
+    over = fiber / m.optimal
+    return Fibers(told_by, velocity, 1.0, active, fiber, cos, over, over, tendon, change)
+
+
+def fibers_loaded(
+    fibers: Fibers, m: Millard2012Equilibrium, by_length: float, elastic: float, tendon: float
+) -> tuple[float, float, float, float, float]:
+    """What these curves say: velocity, or what tells it, factor of the active force, `by_length` and the two after."""
+    velocity, by_velocity = fibers.velocity, 1.0
+    if m.is_rigid or fibers.told_by == NONE:
+        tendon = 0.0
+    elif m.damping > 0.0:
+        velocity = tendon / fibers.cos - elastic
+    else:
+        velocity = by_velocity = (tendon / fibers.cos - elastic) / (fibers.active * by_length)
+    return velocity, by_velocity, by_length, elastic, tendon
+
+
+def fibers_asking(fibers: Fibers, m: Millard2012Equilibrium) -> tuple[int, float, float, float]:
+    """Which of the curves of velocity and its inverse is asked, factors of it and its argument, and what their sum is.
+
+    A curve itself is asked where the first factor is 0 and the second 1.
+    """
+    if fibers.told_by == DAMPED:
+        return 0, fibers.active * fibers.by_length, m.damping, fibers.velocity
+    return 1 if fibers.told_by == INVERSE else 0, 0.0, 1.0, fibers.velocity
+
+
+def fibers_moved(fibers: Fibers, m: Millard2012Equilibrium, value: float, missed: float) -> tuple[float, float, float]:
+    """What tells the velocity, it, and factor of the active force, by what the curve says."""
+    if fibers.told_by == DAMPED:
+        is_found, velocity = damped_by(m, fibers.active * fibers.by_length, fibers.velocity, value, missed)
+        return DAMPED if is_found else NONE, velocity, value
+    if fibers.told_by == INVERSE:
+        return INVERSE, value, fibers.by_velocity
+    return fibers.told_by, fibers.velocity, value if fibers.told_by == RIGID else 1.0
+
+
+def muscle_of(
+    fibers: Fibers, m: Millard2012Equilibrium
+) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
+    """What `millard2012_equilibrium` returns, when the curves were asked."""
+    of_curves = fibers.by_length, fibers.elastic, fibers.tendon
+    return muscle_with(fibers, m, fibers.told_by != NONE, fibers.velocity, fibers.by_velocity, *of_curves)
+
+
+def muscle_with(
+    fibers: Fibers,
+    m: Millard2012Equilibrium,
+    is_found: bool,
+    velocity: float,
+    by_velocity: float,
+    by_length: float,
+    elastic: float,
+    tendon: float,
+) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
+    """The same, with what was found in place of what `fibers` has."""
+    active, fiber, cos = fibers.active, fibers.length, fibers.cos
+    pull = m.strength * (active * by_length * by_velocity)
+    spring = m.strength * elastic
+    passive = spring + m.strength * m.damping * velocity
+    if fiber <= m.smallest and velocity <= 0.0:
+        velocity, by_velocity, pull, spring, passive = 0.0, 1.0, 0.0, 0.0, 0.0
+    if m.is_rigid:
+        passive = max(passive, -pull)
+        tension = (pull + passive) * cos
+    else:
+        tension = tendon * m.strength
+    speed = velocity * m.fastest * m.optimal
+    return tension, active, fiber, cos, by_length, by_velocity, pull, passive, is_found, fibers.change, speed, spring
+
+
+def millard2012_rigid(now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves) -> float:
+    """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim.
+
+    As there, the pennation that takes the force to the tendon is that of fibers as many meters long as they have
+    optimal lengths: next to none.
+    """
+    fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
+    if fiber <= m.smallest:
+        return 0.0
+    cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
+    by_length, _ = curve_value(curves.active, fiber / m.optimal)
+    by_velocity, _ = curve_value(curves.velocity, now.rate * cos / (m.optimal * m.fastest))
+    taken = cos_pennation(fiber / m.optimal, m.height, m.shortest, m.largest_sin, m.least_cos)
+    return m.strength * by_length * by_velocity * taken
+
+
+def damped_velocity(
+    m: Millard2012Equilibrium,
+    active: float,
+    by_length: float,
+    elastic: float,
+    tendon: float,
+    cos: float,
+    curves: MillardCurves,
+) -> tuple[bool, float, float]:
+    """The normalized fiber velocity at which damped fibers bear what the tendon does.
+
+    OpenSim looks for it by Newton's method, up to a tolerance of 1e-10; here the search is that on a curve.
+
+    Args:
+        m: the muscle.
+        active: activation.
+        by_length: active force at rest, fully activated.
+        elastic: passive force.
+        tendon: its force.
+        cos: of pennation.
+        curves: of the muscle.
+
+    Returns:
+        Whether there is one, the velocity, and the factor of the active force there.
+    """
+    share, borne = active * by_length, tendon / cos - elastic
+    factor, missed = value_of_sum(curves.velocity, share, m.damping, borne)
+    is_found, velocity = damped_by(m, share, borne, factor, missed)
+    return is_found, velocity, factor
+
+
+def damped_by(
+    m: Millard2012Equilibrium, share: float, borne: float, factor: float, missed: float
+) -> tuple[bool, float]:
+    """Whether a search for the velocity has found it, and what bears the rest of a load.
+
+    Args:
+        m: the muscle.
+        share: active force at rest.
+        borne: by the fibers, but for their passive force at rest.
+        factor: of the active force.
+        missed: how far the search has ended from the load.
+    """
+    return abs(missed) <= VELOCITY_TOLERANCE, (borne - share * factor) / m.damping
+
+
+def millard2012_energy(
+    m: Millard2012Equilibrium, length: float, fiber_length: float, cos: float, curves: MillardCurves
+) -> float:
+    """Potential energy of fibers and tendon, J.
+
+    OpenSim has it from splines of the integrals, which are good to 1e-9 but for the ends of the curves: 1e-6 there.
+
+    Args:
+        m: the muscle.
+        length: of the path, m.
+        fiber_length: m.
+        cos: of pennation.
+        curves: of the muscle.
+    """
+    stored = m.optimal * curve_integral(curves.passive, fiber_length / m.optimal)
+    if not m.is_rigid:
+        stored += m.slack * curve_integral(curves.tendon, (length - fiber_length * cos) / m.slack)
+    return m.strength * stored
+
+
+def millard2012_equilibrium_length(
+    now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
+) -> tuple[bool, float]:
+    """Whether there is a fiber length at which fibers at rest and tendon bear the same, and that length (m).
+
+    Newton's method with halved steps, step for step as in estimateMuscleFiberState of OpenSim's class, which knows
+    nothing of the rate of the path. A length that would be below the least is that.
+    """
+    length, active = now.length, min(max(now.excitation if m.is_excited else now.activation, m.least), 1.0)
+    tolerance = max(1e-8 * m.strength, 10.0 * SIGNIFICANT)
+    fiber = max(fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos), m.smallest)
+    error, slope = imbalance(m, length, fiber, active, curves)
+    for _ in range(LENGTH_ROUNDS):
+        if not abs(error) > tolerance:
+            break
+        before, last, part, direction = error, fiber, 1.0, error / slope
+        while abs(error) >= abs(before):
+            step = -part * direction
+            if not abs(step) > SIGNIFICANT:
+                # Perhaps the other direction leads on.
+                step, part = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
+            fiber = max(last + step, m.smallest)
+            error, slope = imbalance(m, length, fiber, active, curves)
+            if part <= SMALLEST:
+                break
+            part *= 0.5
+    return abs(error) < tolerance or (fiber <= m.smallest and not isnan(error)), fiber
+
+
+def imbalance(
+    m: Millard2012Equilibrium, length: float, fiber: float, active: float, curves: MillardCurves
+) -> tuple[float, float]:
+    """What fibers at rest bear along the tendon and the tendon does not, N, and its derivative, N/m.
+
+    Args:
+        m: the muscle.
+        length: of the path, m.
+        fiber: length of the fibers, m.
+        active: activation.
+        curves: of the muscle.
+    """
+    if fiber <= m.height:
+        return nan, nan
+    cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
+    by_length, active_slope = curve_value(curves.active, fiber / m.optimal)
+    elastic, passive_slope = curve_value(curves.passive, fiber / m.optimal)
+    tendon, tendon_slope = curve_value(curves.tendon, (length - fiber * cos) / m.slack)
+    borne = m.strength * (active * by_length) + m.strength * elastic
+    sin = m.height / fiber
+    turn = sin * sin / cos
+    along = m.strength * (active * active_slope + passive_slope) / m.optimal * cos + borne * turn / fiber
+    return borne * cos - tendon * m.strength, along + tendon_slope * m.strength / m.slack * (cos + turn)

@@ -1,0 +1,91 @@
+"""Hunt-Crossley contact of a half space and a sphere, made smooth.
+
+As in :mod:`osimlite.mechanics.laws.hunt_crossley` the half space is surface 1 and the sphere surface 2, n is the unit normal
+of the half space, d the depth and v the velocity of surface 1 relative to surface 2. Source: G. Serrancolí et al.,
+"Subject-exoskeleton contact model calibration leads to accurate interaction force predictions", IEEE Transactions on
+Neural Systems and Rehabilitation Engineering 27 (2019) 1597-1605, as Simbody's SmoothSphereHalfSpaceForce has it.
+"""
+
+from __future__ import annotations
+
+from math import sqrt, tanh
+
+from osimlite.mechanics.laws.hunt_crossley import friction
+from osimlite.mechanics.laws.vectors import Vector, along, dot, times
+
+
+def smooth_hertz(d: float, R: float, E: float, cf: float, bd: float) -> float:
+    """Elastic force (4/3) k sqrt(R k) (d^2 + cf)^(3/4) (1 + tanh(bd d)) / 2, k = E^(2/3) / 2, in N.
+
+    Args:
+        d: depth, m, negative for a gap.
+        R: radius of the sphere, m.
+        E: stiffness property, Pa.
+        cf: what keeps the force from vanishing, m^2.
+        bd: how sharply the force sets in, 1/m.
+    """
+    k: float = 0.5 * E ** (2.0 / 3.0)
+    s = sqrt(d * d + cf)
+    return (4.0 / 3.0) * k * sqrt(R * k) * s * sqrt(s) * (0.5 + 0.5 * tanh(bd * d))
+
+
+def smooth_contact_force(
+    hertz: float, c: float, us: float, ud: float, uv: float, vt: float, cf: float, bv: float, n: Vector, v: Vector
+) -> Vector:
+    """Force on the sphere, in N, at the point midway between the two surfaces.
+
+    f = fh (1 + (3/2) c vn) (1 + tanh(bv (vn + 2 / (3 c)))) / 2 along n, and along the slip vT
+    f mu / w with w = sqrt(|vT|^2 + cf) and mu its `friction`.
+
+    Args:
+        hertz: fh from `smooth_hertz`, N.
+        c: dissipation, s/m. With 0, f = fh.
+        us: coefficient as of :func:`osimlite.mechanics.laws.hunt_crossley.friction`, with ud and uv.
+        vt: transition velocity, m/s.
+        cf: what keeps w from vanishing, m^2/s^2 (the same number as in `smooth_hertz`).
+        bv: how sharply the force goes when the surfaces separate, s/m.
+        n: unit normal out of the half space, 1.
+        v: velocity of the half space relative to the sphere at the point, m/s.
+    """
+    vn = dot(v, n)
+    f = hertz * (1.0 + 1.5 * c * vn)
+    if c != 0.0:
+        f *= 0.5 + 0.5 * tanh(bv * (vn + 2.0 / (3.0 * c)))
+    slip = along(v, -vn, n)
+    w = sqrt(dot(slip, slip) + cf)
+    return along(times(f, n), f * friction(w, us, ud, uv, vt) / w, slip)
+
+
+def smooth_contact_derivatives(
+    d: float, R: float, E: float, cf: float, bd: float, c: float, us: float, ud: float, uv: float, vt: float,
+    bv: float, n: Vector, v: Vector,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """How the force of `smooth_contact_force` changes; the arguments are its own and those of `smooth_hertz`.
+
+    Returns:
+        Of the force along n its derivatives by the depth (N/m) and by the approach v n (N s/m), the force across n over
+        the slip (N s/m), and by what part the force grows with the depth (1/m); all 0 where there is no force.
+    """
+    hertz, vn = smooth_hertz(d, R, E, cf, bd), dot(v, n)
+    if hertz <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    # 1 - tanh^2 over (1 + tanh) / 2 is 2 (1 - tanh).
+    growth = 1.5 * d / (d * d + cf) + bd * (1.0 - tanh(bd * d))
+    part, slope = 1.0 + 1.5 * c * vn, 1.5 * c
+    if c != 0.0:
+        t = tanh(bv * (vn + 2.0 / (3.0 * c)))
+        slope = (0.5 + 0.5 * t) * (slope + part * bv * (1.0 - t))
+        part *= 0.5 + 0.5 * t
+    slip = along(v, -vn, n)
+    w = sqrt(dot(slip, slip) + cf)
+    return hertz * part * growth, hertz * slope, hertz * part * friction(w, us, ud, uv, vt) / w, growth
+
+
+def smooth_contact_energy(hertz: float, d: float) -> float:
+    """(2/5) fh d, in J, as Simbody approximates the energy; negative (and tiny) where the surfaces are apart.
+
+    Args:
+        hertz: fh from `smooth_hertz`, N.
+        d: depth, m.
+    """
+    return 0.4 * hertz * d

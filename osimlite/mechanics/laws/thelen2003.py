@@ -1,0 +1,315 @@
+"""The muscle of D. G. Thelen (Journal of Biomechanical Engineering 125, 2003), as OpenSim's Thelen2003Muscle has it.
+
+Forces are parts of the maximum isometric force F, fiber lengths of the optimal fiber length, fiber velocities of the
+maximum contraction velocity times that length, tendon lengths of the tendon slack length.
+"""
+
+from __future__ import annotations
+
+from math import exp, isnan, nan, sqrt
+from typing import NamedTuple
+
+from osimlite.mechanics.laws.muscles import (
+    SIGNIFICANT,
+    MuscleInputs,
+    cos_pennation,
+    fiber_length_along,
+    first_order_activation_rate,
+)
+
+TOE_SHAPE, TOE_FORCE = 3.0, 0.33
+"""Of the tendon: the exponent at the end of its toe, and the force there."""
+ROUNDS, INVERSE_ROUNDS = 20, 100
+"""Newton's steps in the search for an equilibrium, and in that for a force at a velocity."""
+ENOUGH = 1e-6
+"""What the velocity may be off where the tendon is taken for rigid, as in OpenSim."""
+SMALLEST = 2.0**-26
+"""Least part of a step, and the step (m) in the other direction where there is none."""
+
+
+class Thelen2003(NamedTuple):
+    """The numbers of a muscle."""
+
+    strength: float  # max_isometric_force F, N
+    optimal: float  # optimal_fiber_length, m
+    slack: float  # tendon_slack_length, m
+    fastest: float  # max_contraction_velocity, 1/s
+    rising: float  # activation_time_constant, s
+    falling: float  # deactivation_time_constant, s
+    least: float  # minimum_activation
+    width: float  # KshapeActive
+    shape: float  # Af
+    most: float  # Flen
+    bound: float  # fv_linear_extrap_threshold
+    height: float  # as of `pennation`, with the three that follow
+    shortest: float
+    largest_sin: float
+    least_cos: float
+    toe: float  # as of `tendon_shape`, with the three that follow
+    growth: float
+    factor: float
+    slope: float
+    passive_growth: float  # KshapePassive / FmaxMuscleStrain
+    passive_factor: float  # 1 / (exp(KshapePassive) - 1)
+
+
+class Fibers(NamedTuple):
+    """Fibers of some length (m) in a muscle: what they and the tendon would bear, and the slopes of that."""
+
+    length: float  # m
+    cos: float  # of pennation
+    is_taut: bool  # whether the tendon is longer than slack
+    tendon: float  # its force
+    tendon_slope: float  # over its normalized length
+    active: float  # force at rest, fully activated
+    active_slope: float  # over the normalized length
+    passive: float  # force
+    passive_slope: float  # over the normalized length
+
+
+def fibers_at(m: Thelen2003, path_length: float, length: float) -> Fibers:
+    """Fibers of some length, m."""
+    cos = cos_pennation(length, m.height, m.shortest, m.largest_sin, m.least_cos)
+    tendon_length = path_length - length * cos
+    tendon, tendon_slope = tendon_force(tendon_length / m.slack - 1.0, m.toe, m.growth, m.factor, m.slope)
+    active, active_slope = active_force(length / m.optimal, m.width)
+    passive, passive_slope = passive_force(length / m.optimal, m.passive_growth, m.passive_factor)
+    is_taut = tendon_length > m.slack
+    return Fibers(length, cos, is_taut, tendon, tendon_slope, active, active_slope, passive, passive_slope)
+
+
+def tendon_shape(strain_at_one: float) -> tuple[float, float, float, float]:
+    """The tendon's force over its strain, an exponential toe and a line, from the strain at F.
+
+    Returns:
+        Strain at the end of the toe, exponent over strain and factor of the toe, slope of the line.
+    """
+    end = 99.0 * strain_at_one * exp(TOE_SHAPE) / (166.0 * exp(TOE_SHAPE) - 67.0)
+    return end, TOE_SHAPE / end, TOE_FORCE / (exp(TOE_SHAPE) - 1.0), 0.67 / (strain_at_one - end)
+
+
+def tendon_force(strain: float, toe: float, growth: float, factor: float, slope: float) -> tuple[float, float]:
+    """The tendon's force and its derivative; see `tendon_shape`."""
+    if strain > toe:
+        return slope * (strain - toe) + TOE_FORCE, slope
+    if strain > 0.0:
+        grown = exp(growth * strain)
+        return factor * (grown - 1.0), factor * growth * grown
+    return 0.0, 0.0
+
+
+def tendon_energy(strain: float, toe: float, growth: float, factor: float, slope: float) -> float:
+    """Integral of the tendon's force over its strain."""
+    bent = min(max(strain, 0.0), toe)
+    straight = max(strain - toe, 0.0)
+    return factor * ((exp(growth * bent) - 1.0) / growth - bent) + straight * (TOE_FORCE + 0.5 * slope * straight)
+
+
+def passive_energy(length: float, growth: float, factor: float) -> float:
+    """Integral of the passive force over the normalized length."""
+    off = max(length - 1.0, 0.0)
+    return factor * ((exp(growth * off) - 1.0) / growth - off)
+
+
+def passive_force(length: float, growth: float, factor: float) -> tuple[float, float]:
+    """The passive force of fibers of a normalized length, and its derivative."""
+    if length <= 1.0:
+        return 0.0, 0.0
+    grown = exp(growth * (length - 1.0))
+    return factor * (grown - 1.0), factor * growth * grown
+
+
+def active_force(length: float, width: float) -> tuple[float, float]:
+    """The force at rest of fully activated fibers of a normalized length, and its derivative."""
+    off = length - 1.0
+    force = exp(-off * off / width)
+    return force, -2.0 * off / width * force
+
+
+def fiber_velocity(m: Thelen2003, force: float, activation: float, isometric: float) -> tuple[float, float]:
+    """Normalized velocity of fibers that actively bear a force, and its derivative.
+
+    The paper's curve goes on as a straight line for forces below 0, and near the one that fibers approach that
+    lengthen.
+
+    Args:
+        m: the muscle.
+        force: that they bear.
+        activation: within its bounds.
+        isometric: what they bear at rest.
+    """
+    at = 0.0 if force <= 0.0 else min(force, m.bound * (isometric * m.most))
+    speed = 0.25 + 0.75 * activation
+    if at <= isometric:
+        divisor, change = isometric + at / m.shape, 1.0 / m.shape
+    else:
+        steepness = (2.0 + 2.0 / m.shape) / (m.most - 1.0)
+        divisor, change = steepness * (isometric * m.most - at), -steepness
+    velocity = speed * (at - isometric) / divisor
+    slope = (speed - velocity * change) / divisor
+    return velocity + slope * (force - at), slope
+
+
+def force_at_velocity(m: Thelen2003, velocity: float, activation: float, isometric: float, enough: float) -> float:
+    """What `fiber_velocity` inverts, over the force at rest; not a number if Newton's method does not end.
+
+    Args:
+        m: the muscle.
+        velocity: of the fibers, normalized.
+        activation: within its bounds.
+        isometric: what they bear at rest.
+        enough: what the velocity may be off.
+    """
+    force = isometric
+    for _ in range(INVERSE_ROUNDS):
+        result, slope = fiber_velocity(m, force, activation, isometric)
+        if abs(slope) > SIGNIFICANT:
+            force -= (result - velocity) / slope
+        if abs(result - velocity) < enough:
+            return max(0.0, force / isometric)
+    return nan
+
+
+def tolerance(m: Thelen2003) -> float:
+    """What an equilibrium may be off, N."""
+    return max(1e-8 * m.strength, 10.0 * SIGNIFICANT)
+
+
+def thelen2003(
+    now: MuscleInputs, m: Thelen2003
+) -> tuple[float, float, float, float, float, float, float, float, float, float]:
+    """The muscle at a moment; see Thelen2003Muscle::calcFiberVelocityInfo and calcMuscleDynamicsInfo of OpenSim.
+
+    Fibers at their least length stay there as long as they would shorten, and bear nothing then but what is passive.
+
+    Returns:
+        Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by length and by
+        velocity, active and passive fiber force (N), rate of activation (1/s), fiber velocity (m/s).
+    """
+    active = min(max(now.activation, m.least), 1.0)
+    fibers = fibers_at(m, now.length, max(now.fiber_length, m.shortest))
+    isometric, borne = active * fibers.active, fibers.tendon / fibers.cos - fibers.passive
+    velocity, _ = fiber_velocity(m, borne, active, isometric)
+    by_velocity = borne / isometric
+    if now.fiber_length <= m.shortest and velocity <= 0.0:
+        velocity, by_velocity, borne = 0.0, 1.0, 0.0
+    return (
+        fibers.tendon * m.strength,
+        active,
+        fibers.length,
+        fibers.cos,
+        fibers.active,
+        by_velocity,
+        borne * m.strength,
+        fibers.passive * m.strength,
+        first_order_activation_rate(now.excitation, now.activation, m.rising, m.falling, m.least),
+        velocity * m.fastest * m.optimal,
+    )
+
+
+def thelen2003_rigid(now: MuscleInputs, m: Thelen2003) -> float:
+    """Force (N) of fully active fibers along a rigid tendon; see calcInextensibleTendonActiveFiberForce of OpenSim."""
+    fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
+    if not fiber > m.shortest:
+        return 0.0
+    cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
+    isometric, _ = active_force(fiber / m.optimal, m.width)
+    factor = force_at_velocity(m, now.rate * cos / (m.optimal * m.fastest), 1.0, isometric, ENOUGH)
+    return m.strength * isometric * factor * cos
+
+
+def thelen2003_energy(m: Thelen2003, length: float, fiber_length: float, cos: float) -> float:
+    """Potential energy of tendon and fibers, J.
+
+    As in OpenSim, whose fibers store what those of as many optimal lengths do as they have meters: none below 1 m.
+
+    Args:
+        m: the muscle.
+        length: of the path, m.
+        fiber_length: m.
+        cos: of pennation.
+    """
+    strain = (length - fiber_length * cos) / m.slack - 1.0
+    tendon = m.slack * tendon_energy(strain, m.toe, m.growth, m.factor, m.slope)
+    return m.strength * (tendon + m.optimal * passive_energy(fiber_length, m.passive_growth, m.passive_factor))
+
+
+def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, float]:
+    """Whether there is a fiber length at which fibers and tendon bear the same, and that length (m).
+
+    Newton's method with halved steps, step for step as in Thelen2003Muscle::initMuscleState: the rate of the path is
+    shared between fibers and tendon by their stiffness, so that a muscle whose path moves does not start at rest. A
+    length that would be below the least is that.
+    """
+    length, active = now.length, min(max(now.activation, m.least), 1.0)
+    fibers = fibers_at(m, length, fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos))
+    stiffness, _ = stiffnesses(m, fibers, active, 0.0)
+    by_velocity = shared(m, fibers, active, now.rate, stiffness)
+    borne, error = balance(m, fibers, active * by_velocity)
+    stiffness, of_tendon = stiffnesses(m, fibers, active * by_velocity, borne)
+    for _ in range(ROUNDS):
+        if not abs(error) > tolerance(m):
+            break
+        before, last, part = error, fibers.length, 1.0
+        while abs(error) >= abs(before):
+            step = -part * before / (stiffness - of_tendon)
+            if not abs(step) > SIGNIFICANT:
+                # Perhaps the other direction leads on.
+                step, part = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
+            fibers = fibers_at(m, length, max(last + step, m.shortest))
+            borne, error = balance(m, fibers, active * by_velocity)
+            if part <= SMALLEST:
+                break
+            part *= 0.5
+        stiffness, of_tendon = stiffnesses(m, fibers, active * by_velocity, borne)
+        by_velocity = shared(m, fibers, active, now.rate, stiffness)
+    if isnan(by_velocity):
+        return False, fibers.length
+    return abs(error) < tolerance(m) or fibers.length <= m.shortest, fibers.length
+
+
+def balance(m: Thelen2003, fibers: Fibers, active: float) -> tuple[float, float]:
+    """Force of the fibers, and what of it along the tendon the tendon does not bear, N.
+
+    Args:
+        m: the muscle.
+        fibers: of it.
+        active: activation times the factor by velocity.
+    """
+    borne = (active * fibers.active + fibers.passive) * m.strength
+    return borne, borne * fibers.cos - fibers.tendon * m.strength
+
+
+def stiffnesses(m: Thelen2003, fibers: Fibers, active: float, borne: float) -> tuple[float, float]:
+    """Derivatives of the fibers' force along the tendon and of the tendon's, over the fiber length, N/m.
+
+    Args as of `balance`; `borne` is the force of the fibers, N.
+    """
+    length = fibers.length
+    if length <= m.height:
+        return nan, nan
+    sin = m.height / length
+    cos = sqrt(1.0 - sin * sin)
+    stiffness = (active * fibers.active_slope + fibers.passive_slope) * m.strength / m.optimal
+    of_tendon = fibers.tendon_slope * m.strength / m.slack * (-fibers.cos - sin * sin / cos)
+    return stiffness * fibers.cos + borne * sin * sin / (length * cos), of_tendon
+
+
+def shared(m: Thelen2003, fibers: Fibers, activation: float, rate: float, stiffness: float) -> float:
+    """Factor of the active force by the velocity that the fibers have if the stiffer part moves less.
+
+    Args:
+        m: the muscle.
+        fibers: of it.
+        activation: within its bounds.
+        rate: of the path, m/s.
+        stiffness: of the fibers, as of `stiffnesses`, N/m.
+    """
+    if rate == 0.0:
+        return 1.0
+    along, of_tendon = stiffness * fibers.cos, fibers.tendon_slope * m.strength / m.slack
+    of_rate = rate
+    if fibers.is_taut and abs(along + of_tendon) > SIGNIFICANT:
+        of_rate = along / (along + of_tendon) * rate
+    velocity = (rate - of_rate) * fibers.cos / (m.fastest * m.optimal)
+    return force_at_velocity(m, velocity, activation, activation * fibers.active, tolerance(m))

@@ -1,0 +1,311 @@
+"""From the model to the mechanism: sockets followed, frames folded into bodies, joints sorted into a tree."""
+
+from __future__ import annotations
+
+from math import copysign, pi
+
+import numpy as np
+
+from osimlite.base.records import dataclass, replace
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.mechanics.multibody.body_constraints import RollingConstraint, WeldConstraint
+from osimlite.mechanics.multibody.constraints import Constraint, Coupler
+from osimlite.mechanics.multibody.extremes import any_numbers
+from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.joints import MOTIONS, Mobilizer, motion_types
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.motions import Motion, SphericalMotion
+from osimlite.mechanics.multibody.parts import (
+    GROUND,
+    CoordinateInfo,
+    FramePlacement,
+    MassProperties,
+    MobileBody,
+    StationPlacement,
+)
+from osimlite.mechanics.multibody.schema_constraints import ConstraintReader, unknown_constraint
+from osimlite.mechanics.multibody.schema_frames import Placements
+from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.schema_joints import joint_motions, unknown_joint
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.mechanics.multibody.topology import new_base, spanning_tree
+from osimlite.schema import constraints as schema
+from osimlite.schema.base import Component, Unknown
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.frames import Body, PhysicalFrame
+from osimlite.schema.joints import Joint
+from osimlite.schema.markers import Station
+from osimlite.schema.model import Model, expect_model
+
+
+@any_numbers
+def build_mechanism(model: Model, *, opensim_derivatives: bool = False, rolling: bool = False) -> Mechanism:
+    """The tree of bodies and mobilizers that a model describes, with its constraints.
+
+    Bodies come level by level from ground, within a level in the order of the joints that carry them; coordinates
+    come in the order of OpenSim's CoordinateSet. A joint whose child is nearer to ground than its parent is reversed.
+    Bodies that no joint connects to ground get a FreeJoint, named as OpenSim names it.
+
+    Where a joint closes a loop, a WeldJoint becomes a constraint; for any other joint its child body is split into
+    halves, one of which the joint carries, and the halves are welded by a constraint. (OpenSim 4.6 does the same, but
+    then counts the child of the WeldJoint twice, and gives the half a wrong inertia: so it is with
+    `opensim_derivatives`.) Forces and geometry play no part.
+
+    Args:
+        model: the model.
+        opensim_derivatives: compute two second derivatives as OpenSim 4.6 does, which are wrong. Simbody differentiates
+            the angular velocity of a CustomJoint as if its first coordinate alone drove the first rotation and the
+            first two alone the first two, so accelerations are off where one coordinate drives several rotations (the
+            knee of Rajagopal's model: up to 1 % at usual speeds) and energy is not conserved. And OpenSim takes the
+            gradient of a MultivariatePolynomialFunction for each column of its Hessian. Without this switch both are
+            right.
+        rolling: let every RollingOnSurfaceConstraint act. OpenSim leaves them off until a program turns them on.
+
+    Raises:
+        ModelError: something names what does not exist, a joint connects
+            a body with itself or has the wrong number of coordinates, a mass, an inertia, a function is impossible.
+        UnsupportedError: a joint, a constraint, a frame or a function of another class; a loop closed by a FreeJoint or
+            by a joint whose child is ground.
+    """
+    expect_model(model)
+    return _Builder(model, opensim_derivatives, rolling).mechanism()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Edge:
+    """A joint of some kind, with the bodies (or ground) and frames it connects and the places of its coordinates."""
+
+    kind: str
+    path: str
+    parent: str
+    child: str
+    parent_frame: Array
+    child_frame: Array
+    motions: tuple[Motion, ...]
+    coordinates: tuple[int, ...]
+
+    def mobilizer(self, *, reversed: bool) -> Mobilizer:
+        return Mobilizer(
+            joint=self.path,
+            joint_type=self.kind,
+            motions=self.motions,
+            coordinates=self.coordinates,
+            parent_frame=self.parent_frame,
+            child_frame=self.child_frame,
+            reversed=reversed,
+        )
+
+
+class _Builder:
+    def __init__(self, model: Model, opensim_derivatives: bool, rolling: bool) -> None:
+        self.model = model
+        self.opensim_derivatives, self.rolling = opensim_derivatives, rolling
+        self.tree = model.tree()
+        self.placements = Placements(self.tree)
+        self.coordinates: list[CoordinateInfo] = []
+        self.bodies: dict[str, Body] = {}
+        self.constraints: list[Constraint] = []
+
+    def mechanism(self) -> Mechanism:
+        for component in self.tree.components:
+            self._refuse(component)
+        for component in self.tree.components:
+            if isinstance(component, Body):
+                self.bodies[self.placements.path(component)] = component
+            if isinstance(component, PhysicalFrame):
+                self.placements.frame(component)
+        edges = [self._edge(joint) for joint in self.tree.components if isinstance(joint, Joint)]
+        bodies = self._bodies(edges)
+        ground = self.placements.path(self.model.ground)
+        index = {body.path: place for place, body in enumerate(bodies)} | {ground: GROUND}
+        self._constrain(index)
+        placed = self.placements
+        for path, (base, _) in placed.found.items():
+            if base not in index:
+                raise UnsupportedError(f"the frame '{path}' is no body of the model, nor fixed to one; take it out")
+        frames = {path: FramePlacement(index[base], matrix) for path, (base, matrix) in placed.found.items()}
+        stations = {}
+        for component in self.tree.components:
+            if isinstance(component, Station) and not self.tree.is_internal(component):
+                base, location = placed.station(component)
+                stations[placed.path(component)] = StationPlacement(index[base], location)
+        gravity = np.array(self.model.gravity, dtype=float)
+        return Mechanism(
+            self.model.name,
+            tuple(bodies),
+            tuple(self.coordinates),
+            gravity,
+            frames,
+            tuple(self.constraints),
+            stations,
+            self.model.assembly_accuracy,
+        )
+
+    def _refuse(self, component: Component) -> None:
+        """Stop at what would move the bodies differently and is not known."""
+        if not isinstance(component, Unknown):
+            return
+        holder, path = self.tree.parent_of(component), self.placements.path(component)
+        if holder in (self.model.joint_set, self.model.body_set):
+            raise unknown_joint(path, component.class_name)
+        if holder is self.model.constraint_set:
+            raise unknown_constraint(path, component.class_name)
+
+    def _edge(self, joint: Joint) -> _Edge:
+        path = self.placements.path(joint)
+        parent, parent_frame = self.placements.frame(self.placements.named(joint, "socket_parent_frame"))
+        child, child_frame = self.placements.frame(self.placements.named(joint, "socket_child_frame"))
+        if parent == child:
+            raise ModelError(f"the joint '{path}' connects '{parent}' to itself; name frames of two bodies")
+        motions, coordinates = joint_motions(joint, path, opensim_derivatives=self.opensim_derivatives)
+        first, count = len(self.coordinates), len(coordinates)
+        middle = {motion.coordinates[1] for motion in motions if isinstance(motion, SphericalMotion)}
+        kinds = motion_types(motions, count)
+        for index, (coordinate, motion_type) in enumerate(zip(coordinates, kinds, strict=True)):
+            own_path = self.placements.path(coordinate)
+            value = coordinate.default_value
+            low, high = coordinate.range
+            self.coordinates.append(
+                CoordinateInfo(
+                    name=_last(own_path),
+                    path=own_path,
+                    joint=path,
+                    motion_type=motion_type,
+                    default_value=avoid_right_angle(value) if index in middle else value,
+                    default_speed=coordinate.default_speed_value,
+                    range=(low, high),
+                    clamped=coordinate.clamped,
+                    locked=coordinate.locked,
+                    prescribed=self._prescribed(coordinate, own_path),
+                    yielding=coordinate.is_free_to_satisfy_constraints,
+                )
+            )
+        own = tuple(range(first, first + count))
+        return _Edge(type(joint).__name__, path, parent, child, parent_frame, child_frame, motions, own)
+
+    def _prescribed(self, coordinate: Coordinate, path: str) -> Function | None:
+        # OpenSim leaves a prescribed coordinate without a function free. It cannot start where one is locked too.
+        if not coordinate.prescribed or coordinate.prescribed_function is None or coordinate.locked:
+            return None
+        return numeric(
+            coordinate.prescribed_function,
+            1,
+            f"the prescribed_function of '{path}'",
+            opensim_derivatives=self.opensim_derivatives,
+        )
+
+    def _bodies(self, edges: list[_Edge]) -> list[MobileBody]:
+        """The bodies, each with the mobilizer that carries it; welds for the joints that close loops."""
+        ground = self.placements.path(self.model.ground)
+        masses = {path: body.mass for path, body in self.bodies.items()}
+        joined = {path for edge in edges for path in (edge.parent, edge.child)}
+        edges = [*edges, *(self._free(path, ground) for path in self.bodies if path not in joined)]
+        while True:
+            branches, loops = spanning_tree(edges, ground, masses)
+            index = {ground: GROUND} | {branch.outer: place for place, branch in enumerate(branches)}
+            loose = [path for path in self.bodies if path not in index]
+            if not loose:
+                break
+            edges.append(self._free(new_base(loose, edges), ground))
+        bodies = []
+        for edge, outer, backward in branches:
+            carrier, mobilizer = edge.child if backward else edge.parent, edge.mobilizer(reversed=backward)
+            properties = mass_properties(self.bodies[outer], outer)
+            bodies.append(MobileBody(_last(outer), outer, index[carrier], properties, mobilizer))
+        for edge in loops:
+            if not edge.coordinates:
+                first = FramePlacement(index[edge.parent], edge.parent_frame)
+                second = FramePlacement(index[edge.child], edge.child_frame)
+                self.constraints.append(WeldConstraint(first, second, edge.path))
+                if self.opensim_derivatives:
+                    twice = mass_properties(self.bodies[edge.child], edge.child)
+                    carried = edge.mobilizer(reversed=False)
+                    path = f"{edge.child}_again{len(bodies)}"
+                    bodies.append(MobileBody(_last(path), path, index[edge.parent], twice, carried))
+            elif edge.child == ground or edge.kind == "FreeJoint":
+                raise UnsupportedError(
+                    f"the joint '{edge.path}' closes a loop through '{edge.parent}' and '{edge.child}', "
+                    "which osimlite cannot compute; remove one joint of the loop"
+                )
+            else:
+                self._split(edge, index, bodies)
+        return bodies
+
+    def _free(self, body: str, ground: str) -> _Edge:
+        """The joint that OpenSim makes for a body that nothing connects to ground."""
+        name, motions = f"free_{_last(body)}", MOTIONS["FreeJoint"]
+        path, first = f"{self.placements.path(self.model.joint_set)}/{name}", len(self.coordinates)
+        for index, motion_type in enumerate(motion_types(motions, 6)):
+            own = f"{name}_coord_{index}"
+            self.coordinates.append(CoordinateInfo(own, f"{path}/{own}", path, motion_type))
+        own_places, still = tuple(range(first, first + 6)), np.eye(4)
+        return _Edge("FreeJoint", path, ground, body, still, still, motions, own_places)
+
+    def _split(self, edge: _Edge, index: dict[str, int], bodies: list[MobileBody]) -> None:
+        """Let the joint carry a part of its child, and weld that to the rest."""
+        place, whole = index[edge.child], mass_properties(self.bodies[edge.child], edge.child)
+        parts = [place, *(k for k, body in enumerate(bodies) if body.path.startswith(f"{edge.child}_part"))]
+        path = f"{edge.child}_part{len(parts)}"
+        bodies.append(MobileBody(_last(path), path, index[edge.parent], whole, edge.mobilizer(reversed=False)))
+        parts.append(len(bodies) - 1)
+        share = whole.share(len(parts))
+        for part in parts:
+            # OpenSim gives its parts, but for the body itself, the inertia about the origin of 1 kg of the body.
+            wrong = self.opensim_derivatives and part != place
+            inertia = whole.about_origin() / whole.mass if wrong and whole.mass else share.inertia
+            bodies[part] = replace(bodies[part], mass_properties=replace(share, inertia=inertia))
+        still = np.eye(4)
+        weld = WeldConstraint(FramePlacement(place, still), FramePlacement(len(bodies) - 1, still), edge.path)
+        self.constraints.append(weld)
+
+    def _constrain(self, index: dict[str, int]) -> None:
+        places = {info.path: place for place, info in enumerate(self.coordinates)}
+        reader = ConstraintReader(self.placements, index, places, self.opensim_derivatives)
+        for component in self.tree.components:
+            if not isinstance(component, schema.Constraint) or not component.isEnforced:
+                continue
+            constraint = reader.constraint(component)
+            if isinstance(constraint, RollingConstraint) and not self.rolling:
+                continue
+            self.constraints.append(constraint)
+            if isinstance(constraint, Coupler):
+                place = constraint.dependent
+                self.coordinates[place] = replace(self.coordinates[place], yielding=True)
+
+
+RIGHT_ANGLE_GAP = 1e-6
+"""Distance (rad) from 90 degrees at which the second of three angles starts at the nearest."""
+
+
+def avoid_right_angle(angle: float) -> float:
+    """Return an angle (rad) that is at least `RIGHT_ANGLE_GAP` away from 90 and -90 degrees.
+
+    OpenSim describes ball and free joints by quaternions, which have no singular pose; the rates of
+    three angles are infinite where the second is exactly there. A motion that starts beside it is
+    the same within the gap.
+    """
+    gap = 0.5 * pi - abs(angle)
+    if abs(gap) >= RIGHT_ANGLE_GAP:
+        return angle
+    return copysign(0.5 * pi - RIGHT_ANGLE_GAP, angle)
+
+
+def mass_properties(body: Body, path: str) -> MassProperties:
+    """Mass properties of a body of a model.
+
+    Raises:
+        ModelError: they are none.
+    """
+    mass = body.mass
+    if not 0.0 <= mass < np.inf:
+        raise ModelError(f"the body '{path}' has mass {mass:g}; give it a mass in kg that is not negative")
+    center, (xx, yy, zz, xy, xz, yz) = np.array(body.mass_center, dtype=float), body.inertia
+    inertia = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), dtype=float)
+    if not (np.isfinite(center).all() and np.isfinite(inertia).all()):
+        raise ModelError(f"the body '{path}' has a mass centre or inertia that is not finite; give numbers")
+    # OpenSim lets a body without mass have no inertia either.
+    return MassProperties(mass, center, inertia if mass > np.finfo(float).eps else np.zeros((3, 3)))
+
+
+def _last(path: str) -> str:
+    return path.rsplit("/", 1)[1]

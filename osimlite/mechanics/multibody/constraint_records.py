@@ -1,0 +1,180 @@
+"""What a constraint becomes: a law with integers and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from osimlite.errors import UnsupportedError
+from osimlite.mechanics.kernels.constraint_equations import (
+    ARM,
+    AXIS,
+    DISTANCE,
+    MEETING,
+    PRODUCT,
+    SLIP,
+)
+from osimlite.mechanics.kernels.layout import COORDINATE
+from osimlite.mechanics.kernels.least_squares import factor_room
+from osimlite.mechanics.multibody import body_constraints as b
+from osimlite.mechanics.multibody.constraints import Constraint, Coupler, Lock, Prescribed
+from osimlite.mechanics.multibody.function_tables import function_table, table_of_one
+from osimlite.mechanics.multibody.functions import Constant
+from osimlite.mechanics.multibody.parts import GROUND, FramePlacement, StationPlacement
+from osimlite.mechanics.multibody.spatial import Array
+
+if TYPE_CHECKING:
+    from osimlite.mechanics.multibody.links import Places
+
+Balls = Mapping[tuple[int, ...], int]
+"""By the degrees of freedom of a ball, where the place of its arguments is."""
+
+
+class ConstraintRecord(NamedTuple):
+    """One constraint."""
+
+    law: str  # its name
+    ints: list[int]  # of its own
+    numbers: list[float]  # of its own
+    equations: int = 1  # how many
+    positions: int = 1  # how many of these, from the first on, bind positions
+    room: int = 0  # length of its room in the work vector
+    room_at: int = -1  # which of its integers is the place of that
+
+
+class _Vector(NamedTuple):
+    """An axis in a link, or an arm from a point of one link to one of another."""
+
+    ints: list[int]
+    numbers: list[float]
+
+
+class _Equation(NamedTuple):
+    kind: int
+    first: _Vector
+    second: _Vector
+    wanted: float = 0.0
+
+
+def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> ConstraintRecord:
+    """The constraint that keeps up a constraint.
+
+    Raises:
+        UnsupportedError: there is no law for it, or for its function.
+    """
+    match constraint:
+        case Lock():
+            # Every value is right, as long as it stays.
+            own = _coordinate(constraint.coordinate, places, balls)
+            return ConstraintRecord("prescribe", own, table_of_one(Constant(0.0), constraint.name), positions=0)
+        case Prescribed():
+            table = table_of_one(constraint.function, f"the function of '{constraint.name}'")
+            return ConstraintRecord("prescribe", _coordinate(constraint.coordinate, places, balls), table)
+        case Coupler():
+            return _coupler(constraint, places, balls)
+        case b.RollingConstraint():
+            equations = _rolling(constraint, places)
+            return _between(equations, sum(item.kind != SLIP for item in equations))
+        case b.DistanceConstraint():
+            arm = _arm(places, constraint.first, constraint.second)
+            return _between([_Equation(DISTANCE, arm, arm, constraint.distance)])
+        case b.PointConstraint():
+            return _between(_meeting(places, constraint.first, constraint.second))
+        case b.PointOnLineConstraint():
+            arm = _arm(places, constraint.line, constraint.follower)
+            axes = (_axis(places, constraint.line.body, axis) for axis in constraint.across())
+            return _between([_Equation(PRODUCT, axis, arm) for axis in axes])
+        case b.WeldConstraint():
+            return _between(_weld(constraint, places))
+    raise UnsupportedError(
+        f"'{constraint.name}' ({type(constraint).__name__}) cannot be kept up; set its isEnforced to false"
+    )
+
+
+def room_for(equations: int, size: int, entries: int) -> dict[str, int]:
+    """Lengths of the parts of the work vector, by their fields in the record of all constraints."""
+    rows = equations * size
+    by_multipliers, by_directions = 2 * (equations + size), 2 * (equations + size + size * size)
+    return {
+        "WORK_ROWS": rows,
+        "WORK_ERRORS": equations,
+        "WORK_RATES": equations,
+        "WORK_DRIFTS": equations,
+        "WORK_KEPT": rows,
+        "WORK_FACTOR": factor_room(equations, size),
+        "WORK_SYSTEM": entries + size + max(by_multipliers, by_directions),
+        "WORK_TRIAL": 6 * size,
+    }
+
+
+def _coordinate(place: int, places: Places, balls: Balls) -> list[int]:
+    freedom = places.freedom(place)
+    for freedoms, arguments in balls.items():
+        if freedom in freedoms:
+            return COORDINATE.record(DOF=freedom, BALL=arguments, PART=freedoms.index(freedom))
+    return COORDINATE.record(DOF=freedom, BALL=-1, PART=0)
+
+
+def _coupler(constraint: Coupler, places: Places, balls: Balls) -> ConstraintRecord:
+    others = constraint.independent
+    table = function_table(constraint.function, f"the function of '{constraint.name}'")
+    dependent = _coordinate(constraint.dependent, places, balls)
+    ints = [*dependent, 0, len(others), *map(places.freedom, others)]
+    for place in others:
+        ints += _coordinate(place, places, balls)
+    numbers = [places.locked_value(place) for place in (constraint.dependent, *others)]
+    return ConstraintRecord("couple", ints, [*numbers, *table], room=max(len(others), 1), room_at=len(dependent))
+
+
+def _between(equations: Sequence[_Equation], positions: int | None = None) -> ConstraintRecord:
+    ints: list[int] = []
+    numbers: list[float] = []
+    for item in equations:
+        ints += [item.kind, *item.first.ints, *item.second.ints]
+        numbers += [*item.first.numbers, *item.second.numbers, item.wanted]
+    count = len(equations)
+    return ConstraintRecord("bind_bodies", ints, numbers, count, count if positions is None else positions)
+
+
+def _axis(places: Places, body: int, axis: ArrayLike) -> _Vector:
+    direction = places.direction(body, np.asarray(axis, dtype=float).tolist())
+    return _Vector([AXIS, places.placement(body).link, GROUND], [*direction, 0.0, 0.0, 0.0])
+
+
+def _arm(places: Places, first: StationPlacement, second: StationPlacement) -> _Vector:
+    (one, start), (two, end) = (places.station(body, point.tolist()) for body, point in (first, second))
+    return _Vector([ARM, one, two], [*start, *end])
+
+
+def _meeting(places: Places, first: StationPlacement, second: StationPlacement) -> list[_Equation]:
+    """No component of an arm along ground's axes is left."""
+    arm = _arm(places, first, second)
+    arm.ints[0] = MEETING
+    axes = (_Vector([AXIS, GROUND, GROUND], [*axis, 0.0, 0.0, 0.0]) for axis in np.eye(3).tolist())
+    return [_Equation(PRODUCT, axis, arm) for axis in axes]
+
+
+def _weld(constraint: b.WeldConstraint, places: Places) -> list[_Equation]:
+    (one, inner), (two, outer) = constraint.first, constraint.second
+    turns = [
+        _Equation(PRODUCT, _axis(places, two, outer[:3, axis]), _axis(places, one, inner[:3, (axis + 1) % 3]))
+        for axis in range(3)
+    ]
+    return [*turns, *_meeting(places, _origin(constraint.first), _origin(constraint.second))]
+
+
+def _rolling(constraint: b.RollingConstraint, places: Places) -> list[_Equation]:
+    surface, roller = constraint.surface, constraint.roller
+    arm = _arm(places, StationPlacement(surface, np.zeros(3)), StationPlacement(roller, np.zeros(3)))
+    x, _, z = np.eye(3)
+    normal: Array = constraint.normal / np.linalg.norm(constraint.normal)
+    square = _Equation(PRODUCT, _axis(places, surface, x), _axis(places, roller, z))
+    slips = [_Equation(SLIP, _axis(places, surface, axis), arm) for axis in (x, z)]
+    return [_Equation(PRODUCT, _axis(places, surface, normal), arm, constraint.height), square, *slips]
+
+
+def _origin(placement: FramePlacement) -> StationPlacement:
+    return StationPlacement(placement.body, placement.transform[:3, 3])

@@ -1,0 +1,185 @@
+"""Forces and accelerations of a mechanism.
+
+The equation of motion reads M udot + C = gravity + applied forces, where the generalized forces belong to the
+generalized speeds. The kernels compute it, see :mod:`osimlite.mechanics.kernels.dynamics`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from osimlite.base.records import dataclass
+from osimlite.errors import SimulationError
+from osimlite.mechanics.kernels.constrained_dynamics import constrained_dynamics
+from osimlite.mechanics.kernels.dynamics import (
+    accelerate,
+    composite_rigid_body,
+    generalized_forces,
+    solve,
+    spatial_inertias_and_bias,
+)
+from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL, OUTCOME
+from osimlite.mechanics.kernels.parts import link_work
+from osimlite.mechanics.kernels.pointers import Floats, at
+from osimlite.mechanics.multibody.functions import floats
+from osimlite.mechanics.multibody.kinematics import Kinematics, numbers
+from osimlite.mechanics.multibody.linear import solutions
+from osimlite.mechanics.multibody.spatial import Array
+
+if TYPE_CHECKING:
+    from osimlite.mechanics.multibody.mechanism import Mechanism
+
+
+LARGEST = 1e100
+"""Numbers beyond this, in SI units, are not computed with, nor inertias below its inverse: their squares overflow."""
+
+
+class Wrench(NamedTuple):
+    """A force (N) on a body at its origin and a torque (N·m) about it, both (3,) along ground's axes."""
+
+    force: Sequence[float] | Array
+    torque: Sequence[float] | Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MassCentres:
+    """The b bodies of a mechanism at one state, seen from their mass centres, along ground's axes."""
+
+    state: Kinematics
+    masses: Array  # (b,), kg
+    arms: Array  # from the body origins to the mass centres (b, 3), m
+
+    @classmethod
+    def of(cls, state: Kinematics) -> MassCentres:
+        """See a mechanism at `state` from its mass centres."""
+        masses, centres, _ = state.mechanism.inertial
+        return cls(state, masses, (state.rotations[:-1] @ centres[:, :, None])[:, :, 0])
+
+    def positions(self) -> Array:
+        """The mass centres in ground (b, 3)."""
+        return self.state.origins[:-1] + self.arms
+
+    def velocities(self) -> Array:
+        """The velocities of the mass centres in ground (b, 3)."""
+        w, v = np.split(self.state.velocities[:-1], 2, axis=1)
+        return v + np.cross(w, self.arms)
+
+    def kinetic_energy(self) -> float:
+        """Kinetic energy (J)."""
+        w, v = self.state.velocities[:-1, :3], self.velocities()
+        return 0.5 * float(np.sum(w * self._spins()) + np.sum(self.masses[:, None] * v * v))
+
+    def momentum(self) -> tuple[Array, Array]:
+        """Linear momentum (3,) in kg·m/s, and angular momentum (3,) about ground's origin in kg·m²/s."""
+        linear = self.masses[:, None] * self.velocities()
+        return linear.sum(axis=0), (self._spins() + np.cross(self.positions(), linear)).sum(axis=0)
+
+    def _spins(self) -> Array:
+        """The angular momenta of the bodies about their mass centres (b, 3)."""
+        turned = self.state.rotations[:-1]
+        inertias = turned @ self.state.mechanism.inertial[2] @ turned.transpose(0, 2, 1)
+        return (inertias @ self.state.velocities[:-1, :3, None])[:, :, 0]
+
+
+def mass_matrix(state: Kinematics) -> Array:
+    """M (n, n) of the kinetic energy ½ uᵀ M u."""
+    program, data = state.program, _weighed(state, np.zeros(3))
+    with numbers(data):
+        composite_rigid_body(program.model, data, floats([0.0] * len(state.q)))
+    return program.mass_matrix(data)
+
+
+def missing_forces(state: Kinematics, udot: Array, gravity: Array) -> Array:
+    """Generalized forces (n,) that give the speeds the derivatives `udot` (n,) against `gravity` (3,)."""
+    program = state.program
+    model, udots = program.model, floats(udot[program.order].tolist())
+    data, missing = _weighed(state, gravity, udots), floats([0.0] * len(udot))
+    with numbers(data):
+        generalized_forces(model, data, missing)
+    return -np.array(missing)[program.freedoms]
+
+
+def _weighed(state: Kinematics, gravity: Array, udot: Floats | None = None) -> Floats:
+    """The work vector with the inertias of the links, and the wrenches that are missing for their accelerations."""
+    model, reals, data = state.program.model, state.program.reals, floats(state.vectors[0].tobytes())
+    with numbers(data):
+        for link in range(model[MODEL.LINKS]):
+            acceleration = link_work(model, data, link)[LINK_WORK.ACCELERATION + 3 :]
+            # In place of gravity, links are pushed upwards.
+            for k, part in enumerate(gravity.tolist()):
+                acceleration[k] -= part
+        if udot is not None:
+            accelerate(model, data, udot)
+        spatial_inertias_and_bias(model, reals, data)
+    return data
+
+
+def accelerations(state: Kinematics, applied: Array) -> Array:
+    """Derivatives of the speeds (n,) under gravity, `applied` generalized forces (n,) and the constraints.
+
+    Equations that follow from others or contradict them are fulfilled in the sense of least squares. Where the mass
+    matrix cannot be divided by, the motion is solved for in the null space of the constraints: they may drive what has
+    no mass.
+
+    Raises:
+        SimulationError: a motion that nothing forbids moves no mass, or something is no number.
+    """
+    program, mechanism, size = state.program, state.mechanism, len(state.q)
+    model, data = program.model, _weighed(state, mechanism.gravity)
+    _, y, f = state.vectors
+    derivative = floats([*f[:size], *applied[program.order].tolist()])
+    right = at(derivative, size)
+    with numbers(data):
+        composite_rigid_body(model, data, right)
+    matrix = program.mass_matrix(data)
+    require_numbers(mechanism, matrix, np.array(right))
+    require_numbers(mechanism, *state.all_equations[1:])
+    status = OUTCOME.SINGULAR_MASS
+    with suppress(ArithmeticError, ValueError):
+        if not size or not program.constraints:
+            status = OUTCOME.OK if solve(model, data, right) < 0 else OUTCOME.SINGULAR_MASS
+        else:
+            status = constrained_dynamics(model, program.heavy, data, y, derivative, 0)
+    udot: Array = np.array(right)[program.freedoms]
+    if status != OUTCOME.OK or (size and not np.isfinite(udot).all()):
+        raise massless(_name_of_massless(mechanism, matrix, state.all_equations.rows))
+    return udot
+
+
+def require_numbers(mechanism: Mechanism, *arrays: Array) -> None:
+    """Check arrays of the equations of motion.
+
+    Raises:
+        SimulationError: an entry is not finite, or too large to be computed with.
+    """
+    if not all((np.abs(array) < LARGEST).all() for array in arrays):
+        raise SimulationError(
+            f"the equations of motion of '{mechanism.name}' are not finite; check the coordinate values and speeds, "
+            "the applied forces, the masses and inertias of the bodies and the places of the frames"
+        )
+
+
+def massless(coordinate: str) -> SimulationError:
+    """The error of a motion that can be as fast as it likes.
+
+    Args:
+        coordinate: name of the one that moves most in it.
+    """
+    return SimulationError(
+        f"coordinate '{coordinate}' moves no mass, or a negative inertia, or its axis lies in this pose along another "
+        "of the same joint; give the bodies beyond its joint mass and inertia, lock it, or start in another pose"
+    )
+
+
+def _name_of_massless(mechanism: Mechanism, matrix: Array, rows: Array) -> str:
+    """Name of the coordinate that moves most in the motion which moves least, of those that `rows` (m, n) allow."""
+    _, free = solutions(rows, np.zeros(len(rows)))
+    matrix = free.T @ matrix @ free
+    scale = np.sqrt(np.where(matrix.diagonal() > 0.0, matrix.diagonal(), 1.0))
+    _, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    motion = free @ (vectors[:, 0] / scale)
+    return mechanism.coordinates[int(np.argmax(np.abs(motion)))].name

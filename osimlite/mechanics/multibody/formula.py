@@ -1,0 +1,481 @@
+"""Formulas of expression-based forces.
+
+The grammar is that of Lepton, which OpenSim uses: numbers, variables, + - * / ^, parentheses, functions, and after
+semicolons definitions ``name = formula`` that the text before them may use. ^ binds most closely and from the right,
+a sign less closely than ^ and more closely than *. White space means nothing.
+
+As Lepton does, a formula is simplified as it is read: ``0*x`` is 0, ``x-x`` is 0 and ``x/x`` is 1, whatever x is. What
+drops out may be NaN, or a name that nothing has.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from osimlite.base.records import dataclass
+from osimlite.base.text import counted, did_you_mean, listed
+from osimlite.errors import ModelError
+from osimlite.mechanics.kernels.programs import STEPS
+from osimlite.mechanics.laws import formulas
+from osimlite.mechanics.laws.formulas import FUNCTIONS, OF_TWO
+
+DERIVATIVES = {
+    "+": ("1", "1"),
+    "-": ("1", "-1"),
+    "*": ("y", "x"),
+    "negative": ("-1",),
+    "divide": ("1/y", "-x/(y*y)"),
+    "power": ("y*x^(y-1)", "log(x)*x^y"),
+    "smaller": ("1-step(x-y)", "step(x-y)"),
+    "larger": ("step(x-y)", "1-step(x-y)"),
+    "square_root": ("0.5/sqrt(x)",),
+    "exponential": ("exp(x)",),
+    "logarithm": ("1/x",),
+    "sine": ("cos(x)",),
+    "cosine": ("-sin(x)",),
+    "secant": ("sec(x)*tan(x)",),
+    "cosecant": ("-csc(x)*cot(x)",),
+    "tangent": ("square(sec(x))",),
+    "cotangent": ("-square(csc(x))",),
+    "arcsine": ("1/sqrt(1-x*x)",),
+    "arccosine": ("-1/sqrt(1-x*x)",),
+    "arctangent": ("1/(1+x*x)",),
+    "hyperbolic_sine": ("cosh(x)",),
+    "hyperbolic_cosine": ("sinh(x)",),
+    "hyperbolic_tangent": ("1-square(tanh(x))",),
+    "error_function": ("1.1283791670955126*exp(-x*x)",),
+    "complementary_error_function": ("-1.1283791670955126*exp(-x*x)",),
+    "square": ("2*x",),
+    "cube": ("3*x*x",),
+    "reciprocal": ("-1/(x*x)",),
+    "magnitude": ("2*step(x)-1",),
+}
+"""The derivatives of a law by its arguments x and y; steps have none."""
+
+LAWS = {"/": "divide", "^": "power"}
+"""The law for a sign, where that is not called like it."""
+_UNKNOWN = "unknown"
+"""The law of a step that stands for a name that nothing has."""
+_SIGNS: dict[str, Callable[..., float]] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "negative": lambda a: -a,
+}
+PRECEDENCE = {"+": 0, "-": 0, "*": 1, "/": 1, "^": 3}
+SIGN, OPEN = 2, -1
+"""Of a sign before an operand, and of what only a parenthesis closes."""
+
+_TOKEN = re.compile(
+    r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)|(?P<name>[^-+*/^(),\d.][^-+*/^(),]*)|(?P<sign>.)"
+)
+
+
+class Step(NamedTuple):
+    """One number of a formula."""
+
+    law: str  # "number", "negative", "+", "-", "*", or the name of a law
+    arguments: tuple[int, ...] = ()  # registers that it is applied to
+    value: float = 0.0  # the number, if it is one
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A formula as a list of steps, so that neither its length nor its depth has a limit."""
+
+    variables: tuple[str, ...]  # names of what it is computed from, in the first registers
+    steps: tuple[Step, ...]  # each gives the number of the next register; the last one gives the result
+
+    @classmethod
+    def parse(cls, text: str, variables: Sequence[str], where: str) -> Formula:
+        """Read a formula.
+
+        Args:
+            text: the formula.
+            variables: names it may use.
+            where: the path and property it stands in, for messages.
+
+        Raises:
+            UnknownVariableError: it needs a variable that there is not.
+            ModelError: it is no formula.
+        """
+        main, *definitions = re.sub(r"\s", "", text).split(";")
+        reader = _Reader(variables)
+        try:
+            for definition in reversed([item for item in definitions if item]):
+                name, equals, body = definition.partition("=")
+                if not name or not equals:
+                    raise _Wrong(f"'{definition}' has no name; write name = formula")
+                reader.known[name] = reader.read(body)
+            steps = reader.ending_with(reader.read(main))
+        except _Wrong as wrong:
+            kind = UnknownVariableError if isinstance(wrong, _UnknownName) else ModelError
+            raise kind(f"{where} is '{text}': {wrong}") from None
+        return cls(tuple(variables), steps)
+
+    def derivative(self, variable: int) -> Formula:
+        """The derivative by one of the variables."""
+        reader = _Reader(self.variables)
+        reader.append_steps(self.steps)
+        first = len(self.variables)
+        derivatives = {variable: reader.add("number", value=1.0)}
+        for index, step in enumerate(self.steps, start=first):
+            reader.known = dict(zip("xy", step.arguments, strict=False))
+            for argument, rule in zip(step.arguments, DERIVATIVES.get(step.law, ()), strict=False):
+                if argument in derivatives:
+                    part = reader.add("*", reader.read(rule), derivatives[argument])
+                    derivatives[index] = reader.add("+", derivatives[index], part) if index in derivatives else part
+        last = first + len(self.steps) - 1
+        return Formula(
+            self.variables,
+            reader.ending_with(derivatives[last] if last in derivatives else reader.add("number", value=0.0)),
+        )
+
+
+class UnknownVariableError(ModelError):
+    """A formula can be read and names a variable that there is not."""
+
+
+class _Wrong(Exception):
+    """What is wrong with a formula."""
+
+
+class _UnknownName(_Wrong):
+    """A formula needs a name that nothing has."""
+
+
+def _compute(law: str, *numbers: float | None) -> float:
+    """Return what a law gives for numbers."""
+    return float((_SIGNS.get(law) or getattr(formulas, law))(*numbers))
+
+
+class _Waiting(NamedTuple):
+    """What waits for an operand: a law of one or two numbers, or what a parenthesis opened."""
+
+    law: str
+    precedence: int
+    before: int
+    """Count of the operands that were there before its own."""
+    name: str = ""
+    """Of the function, if it is a call."""
+
+
+class _Reader:
+    """Reads formulas of the same variables, with a stack of operands and one of what waits for them.
+
+    Attributes:
+        known: registers of the names that may be used.
+        unknown: names that were used and that nothing has.
+        steps: of all formulas so far.
+    """
+
+    def __init__(self, variables: Sequence[str]) -> None:
+        self.known = {name: index for index, name in enumerate(variables)}
+        self.unknown: list[str] = []
+        self.steps: list[Step] = []
+        self._registers: dict[Step, int] = {}
+        self._numbers: dict[float, int] = {}
+        self._derived: set[int] = set()
+        self._first = len(variables)
+        self._operands: list[int] = []
+        self._waiting: list[_Waiting] = []
+
+    def add(self, law: str, *arguments: int, value: float = 0.0) -> int:
+        """Add a step, or what is simpler and as good, and return its register."""
+        if law in ("number", _UNKNOWN):
+            return self._append(law, value=value)
+        constants = [self._constant(argument) for argument in arguments]
+        # Lepton computes what is written in numbers alone, and only then applies its rules: 0/0 is NaN, 0*q/0 is 1.
+        if self._derived.isdisjoint(arguments) and None not in constants:
+            return self._append("number", value=_compute(law, *constants))
+        return self._simplify(law, arguments, constants)
+
+    def append_steps(self, steps: Sequence[Step]) -> None:
+        """Append the steps of another formula of the same variables as they are."""
+        for step in steps:
+            self._registers.setdefault(step, self._first + len(self.steps))
+            self.steps.append(step)
+
+    def ending_with(self, result: int) -> tuple[Step, ...]:
+        """Return the steps that a result needs, of which the last gives it.
+
+        Raises:
+            _Wrong: one of them stands for a name that nothing has, or is NaN whatever the variables are.
+        """
+        needed, waiting = set[int](), [result]
+        while waiting:
+            register = waiting.pop()
+            if register >= self._first and register not in needed:
+                needed.add(register)
+                waiting += self._step(register).arguments
+        places = {register: register for register in range(self._first)}
+        steps: list[Step] = []
+        for register in sorted(needed):
+            step = self._step(register)
+            self._expect_meaning(step)
+            places[register] = self._first + len(steps)
+            steps.append(step._replace(arguments=tuple(places[argument] for argument in step.arguments)))
+        if not steps:
+            # The result is a variable, and the last step has to give it.
+            steps = [Step("number"), Step("+", (result, self._first))]
+        return tuple(steps)
+
+    def _append(self, law: str, *arguments: int, value: float = 0.0) -> int:
+        """Add a step, unless there is the same, and return its register."""
+        step = Step(law, arguments, value)
+        if step not in self._registers:
+            self._registers[step] = self._first + len(self.steps)
+            self.steps.append(step)
+        return self._registers[step]
+
+    def _derive(self, value: float) -> int:
+        """Return the register of a number that a rule gives, apart from those that are written."""
+        if value not in self._numbers:
+            self._numbers[value] = self._first + len(self.steps)
+            self._derived.add(self._numbers[value])
+            self.steps.append(Step("number", value=value))
+        return self._numbers[value]
+
+    def _is_same(self, one: int, two: int) -> bool:
+        first = self._constant(one)
+        return one == two or (first is not None and first == self._constant(two))
+
+    def _step(self, register: int) -> Step:
+        return self.steps[register - self._first] if register >= self._first else Step("variable", (register,))
+
+    def _constant(self, register: int) -> float | None:
+        step = self._step(register)
+        return step.value if step.law == "number" else None
+
+    def _argument(self, law: str, register: int) -> int | None:
+        """Return the register that a law of one number is applied to, None if a register is of another law."""
+        step = self._step(register)
+        return step.arguments[0] if step.law == law else None
+
+    def _scaled(self, register: int) -> tuple[float, int] | None:
+        """Return the factor and the register of a multiple, None if it is none."""
+        step = self._step(register)
+        factor = self._constant(step.arguments[0]) if step.law == "*" else None
+        return None if factor is None else (factor, step.arguments[1])
+
+    def _scale(self, factor: float, register: int) -> int:
+        """Return the register of a multiple; a multiple of a multiple has one factor."""
+        inner = self._scaled(register)
+        if inner is not None:
+            factor, register = factor * inner[0], inner[1]
+        elif (number := self._constant(register)) is not None:
+            return self._derive(factor * number)
+        return self._append("*", self._append("number", value=factor), register)
+
+    def _simplify(self, law: str, arguments: Sequence[int], constants: Sequence[float | None]) -> int:
+        """Add a step of which not all arguments are numbers, by the rules of Lepton's optimizer."""
+        match law:
+            case "+":
+                return self._add_up(*arguments, *constants)
+            case "-":
+                return self._subtract(*arguments, *constants)
+            case "*":
+                return self._multiply(*arguments, *constants)
+            case "divide":
+                return self._divide(*arguments, *constants)
+            case "power":
+                return self._raise(*arguments, *constants)
+            case "negative":
+                return self._negate(*arguments)
+            case "square_root" if (inner := self._argument("square", arguments[0])) is not None:
+                return self._append("magnitude", inner)
+            case "square" if (inner := self._argument("square_root", arguments[0])) is not None:
+                return inner
+        return self._append(law, *arguments)
+
+    def _add_up(self, one: int, two: int, first: float | None, second: float | None) -> int:
+        if first == 0.0:
+            return two
+        if second == 0.0:
+            return one
+        if second is not None:
+            return self._append("+", two, one)
+        if first is None:
+            if (negated := self._argument("negative", two)) is not None:
+                return self._append("-", one, negated) if one != negated else self._derive(0.0)
+            if (negated := self._argument("negative", one)) is not None:
+                return self._append("-", two, negated) if two != negated else self._derive(0.0)
+        return self._append("+", one, two)
+
+    def _subtract(self, one: int, two: int, first: float | None, second: float | None) -> int:
+        if self._is_same(one, two):
+            return self._derive(0.0)
+        if first == 0.0:
+            return self._negate(two)
+        if second is not None:
+            return self._add_up(self._append("number", value=-second), one, -second, first)
+        if (negated := self._argument("negative", two)) is not None:
+            return self._add_up(one, negated, first, None)
+        return self._append("-", one, two)
+
+    def _multiply(self, one: int, two: int, first: float | None, second: float | None) -> int:
+        if first == 0.0 or second == 0.0:
+            return self._derive(0.0)
+        if first == 1.0:
+            return two
+        if second == 1.0:
+            return one
+        if first is not None:
+            return self._scale(first, two)
+        if second is not None:
+            return self._scale(second, one)
+        one_negated, two_negated = self._argument("negative", one), self._argument("negative", two)
+        if one_negated is not None or two_negated is not None:
+            product = self.add(
+                "*", one if one_negated is None else one_negated, two if two_negated is None else two_negated
+            )
+            return product if one_negated is not None and two_negated is not None else self.add("negative", product)
+        if (divisor := self._argument("reciprocal", two)) is not None:
+            return self.add("divide", one, divisor)
+        if (divisor := self._argument("reciprocal", one)) is not None:
+            return self.add("divide", two, divisor)
+        if self._is_same(one, two):
+            return self.add("square", one)
+        if one == self._argument("square", two) or two == self._argument("square", one):
+            return self._append("cube", one if one == self._argument("square", two) else two)
+        return self._append("*", one, two)
+
+    def _divide(self, one: int, two: int, first: float | None, second: float | None) -> int:
+        if self._is_same(one, two):
+            return self._derive(1.0)
+        if first == 0.0:
+            return self._derive(0.0)
+        if first == 1.0:
+            return self._append("reciprocal", two)
+        if second is not None:
+            return one if second == 1.0 else self._scale(_compute("divide", 1.0, second), one)
+        one_negated, two_negated = self._argument("negative", one), self._argument("negative", two)
+        if one_negated is not None or two_negated is not None:
+            ratio = self.add(
+                "divide", one if one_negated is None else one_negated, two if two_negated is None else two_negated
+            )
+            return ratio if one_negated is not None and two_negated is not None else self.add("negative", ratio)
+        if (factor := self._argument("reciprocal", two)) is not None:
+            return self.add("*", one, factor)
+        return self._append("divide", one, two)
+
+    def _raise(self, one: int, two: int, base: float | None, exponent: float | None) -> int:
+        if base == 0.0 or base == 1.0:
+            return self._derive(base)
+        if exponent == 0.0:
+            return self._derive(1.0)
+        if exponent == 1.0:
+            return one
+        laws = {-1.0: "reciprocal", 2.0: "square", 3.0: "cube", 0.5: "square_root"}
+        if exponent in laws:
+            return self.add(laws[exponent], one)
+        return self._append("power", one, two)
+
+    def _negate(self, one: int) -> int:
+        if (inner := self._argument("negative", one)) is not None:
+            return inner
+        if (number := self._constant(one)) is not None:
+            return self._derive(-number)
+        if (multiple := self._scaled(one)) is not None:
+            return self._scale(-multiple[0], multiple[1])
+        return self._append("negative", one)
+
+    def _expect_meaning(self, step: Step) -> None:
+        """Refuse a step that stands for an unknown name, or for NaN: Lepton then never ends to simplify."""
+        if step.law == _UNKNOWN:
+            word = self.unknown[int(step.value)]
+            near = did_you_mean(word, self.known)
+            there = f"there is {listed(list(self.known))}" if self.known else "it has no variables"
+            raise _UnknownName(f"there is no '{word}'{near}; {there}")
+        if step.law == "number" and math.isnan(step.value):
+            raise _Wrong("a part of it without variables is not a number, such as 0/0; remove it")
+
+    def read(self, text: str) -> int:
+        """The register of a formula."""
+        called, wants_operand = "", True
+        for token in _TOKEN.finditer(text):
+            word = token.group()
+            if wants_operand and token["name"] and text.startswith("(", token.end()):
+                called = word
+            elif wants_operand and word == "(":
+                self._open(called)
+                called = ""
+            elif wants_operand and word == "-":
+                self._wait("negative", SIGN, 0)
+            elif wants_operand and not token["sign"]:
+                self._operands.append(self._number_of(token))
+                wants_operand = False
+            elif not wants_operand and word in PRECEDENCE:
+                # ^ takes what stands right of it first, the others what stands left.
+                self._apply(PRECEDENCE[word] + (word == "^"))
+                self._wait(LAWS.get(word, word), PRECEDENCE[word], 1)
+                wants_operand = True
+            elif not wants_operand and word in (",", ")"):
+                wants_operand = self._end_part(word)
+            else:
+                raise _Wrong(f"there is an unexpected '{word}'; remove it")
+        if wants_operand:
+            raise _Wrong("it ends too early; complete it")
+        self._apply(0)
+        if self._waiting:
+            raise _Wrong("its parentheses do not match; close them")
+        return self._operands.pop()
+
+    def _number_of(self, token: re.Match[str]) -> int:
+        word = token.group()
+        if token["number"]:
+            return self.add("number", value=float(word))
+        if word not in self.known:
+            # It may drop out, or be in a definition that nothing uses.
+            if word not in self.unknown:
+                self.unknown.append(word)
+            return self.add(_UNKNOWN, value=float(self.unknown.index(word)))
+        return self.known[word]
+
+    def _wait(self, law: str, precedence: int, taken: int, name: str = "") -> None:
+        self._waiting.append(_Waiting(law, precedence, len(self._operands) - taken, name))
+
+    def _open(self, called: str) -> None:
+        if called and called not in FUNCTIONS:
+            raise _Wrong(f"there is no function '{called}'{did_you_mean(called, FUNCTIONS)}")
+        self._wait(FUNCTIONS.get(called, ""), OPEN, 0, called)
+
+    def _apply(self, least: int) -> None:
+        """Apply what binds at least as closely as this to the operands it waits for."""
+        while self._waiting and self._waiting[-1].precedence >= least:
+            self._take(self._waiting.pop())
+
+    def _take(self, waiting: _Waiting) -> None:
+        arguments = self._operands[waiting.before :]
+        self._operands[waiting.before :] = [self.add(waiting.law, *arguments)]
+
+    def _end_part(self, sign: str) -> bool:
+        """End an argument or a parenthesis; whether another operand must follow."""
+        self._apply(0)
+        if not self._waiting or (sign == "," and not self._waiting[-1].name):
+            raise _Wrong(f"there is an unexpected '{sign}'; remove it")
+        if sign == ",":
+            return True
+        opened = self._waiting.pop()
+        if name := opened.name:
+            wanted, given = 2 if name in OF_TWO else 1, len(self._operands) - opened.before
+            if given != wanted:
+                raise _Wrong(f"'{name}' takes {counted(wanted, 'argument')}, not {given}")
+            self._take(opened)
+        return False
+
+
+def program(formula: Formula) -> tuple[list[int], list[float]]:
+    """Steps and constants of a formula, as `compute` takes them."""
+    steps: list[int] = []
+    constants: list[float] = []
+    for step in formula.steps:
+        one, two, *_ = *step.arguments, 0, 0
+        if step.law == "number":
+            one = len(constants)
+            constants.append(step.value)
+        steps += STEPS.index(step.law), one, two
+    return steps, constants

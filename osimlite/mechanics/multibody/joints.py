@@ -1,0 +1,227 @@
+"""Mobilizers: the joints of a model as products of elementary motions.
+
+What the coordinates of a joint type do is a line of its class in the schema, or a short function here; nothing else in
+the package knows joint types. The conventions (order of coordinates, meaning of speeds) are OpenSim's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from osimlite.base.records import dataclass, field
+from osimlite.errors import ModelError, SimulationError
+from osimlite.mechanics.laws.rotations import X, Y, Z
+from osimlite.mechanics.multibody.arc import ArcPoint
+from osimlite.mechanics.multibody.functions import Function, Linear
+from osimlite.mechanics.multibody.motions import (
+    AxisMotion,
+    Fixed,
+    Motion,
+    SimbodyAccelerationError,
+    SphericalMotion,
+    place,
+    rotate,
+    translate,
+)
+from osimlite.mechanics.multibody.spatial import Array, inverse, rotation_about, transform
+from osimlite.schema.joints import (
+    BallJoint,
+    FreeJoint,
+    GimbalJoint,
+    Joint,
+    MotionType,
+    PinJoint,
+    PlanarJoint,
+    SliderJoint,
+    UniversalJoint,
+    WeldJoint,
+)
+
+
+def _plain(kind: type[Joint]) -> tuple[Motion, ...]:
+    """The motions of a joint type by what its schema says: shifts, then turns, of a ball all at once."""
+    axes, words = {"x": X, "y": Y, "z": Z}, [*enumerate((kind.moves or "").split())]
+    slides = [translate(axes[word[1]], own) for own, word in words if word[0] == "t"]
+    turns = [rotate(axes[word[1]], own) for own, word in words if word[0] == "r"]
+    if kind.speeds_are_rates:
+        return (*slides, *turns)
+    return (*slides, SphericalMotion(tuple(own for turn in turns for own in turn.coordinates)))
+
+
+MOTIONS: dict[str, tuple[Motion, ...]] = {
+    kind.__name__: _plain(kind)
+    for kind in (WeldJoint, PinJoint, SliderJoint, PlanarJoint, UniversalJoint, GimbalJoint, BallJoint, FreeJoint)
+}
+"""X_FM of the joint types that have no properties of their own."""
+
+
+def ellipsoid(radii: ArrayLike) -> tuple[Motion, ...]:
+    """Motions of an EllipsoidJoint: rx, ry, rz on the ellipsoid with `radii` (m) along F."""
+    return (SphericalMotion((0, 1, 2), np.array(radii, dtype=float)),)
+
+
+def scapulothoracic(radii: ArrayLike, winging_origin: ArrayLike, winging_direction: float) -> tuple[Motion, ...]:
+    """Motions of a ScapulothoracicJoint.
+
+    Args:
+        radii: of the thoracic ellipsoid along F (m).
+        winging_origin: x, y of a point of the winging axis (m).
+        winging_direction: angle of the winging axis (rad).
+    """
+    quarter = rotation_about(np.array(Z), math.pi / 2)
+    x, y = np.asarray(winging_origin, dtype=float).tolist()
+    axis = (-math.sin(winging_direction), math.cos(winging_direction), 0.0)
+    return (
+        place(quarter),
+        SphericalMotion((0, 1, 2), np.asarray(radii, dtype=float)[[1, 0, 2]]),
+        place(quarter.T),
+        place(None, (x, y, 0.0)),
+        rotate(axis, 3),
+        place(None, (-x, -y, 0.0)),
+    )
+
+
+def constant_curvature(length: float, neutral: Sequence[float]) -> tuple[Motion, ...]:
+    """Motions of a ConstantCurvatureJoint: the end of a rod that bends about X, then Z, and twists about Y.
+
+    Args:
+        length: of the rod (m).
+        neutral: the three angles (rad) where the coordinates are zero.
+    """
+    bend, swing, twist = (float(angle) for angle in neutral)
+    slides = (
+        AxisMotion("translate", np.array(axis), (0, 1), ArcPoint(component, length, (bend, swing)))
+        for component, axis in enumerate((X, Y, Z))
+    )
+    turns = (
+        AxisMotion("rotate", np.array(axis), (place,), Linear(1.0, start))
+        for place, (axis, start) in enumerate(((X, bend), (Z, swing), (Y, twist)))
+    )
+    return (*slides, *turns)
+
+
+class TransformAxis(NamedTuple):
+    """One axis of a CustomJoint: `function` of `coordinates` (places in the joint) along or about `axis`."""
+
+    coordinates: tuple[int, ...]
+    axis: ArrayLike
+    function: Function
+
+
+def custom(
+    rotations: Sequence[TransformAxis], translations: Sequence[TransformAxis], *, opensim_derivatives: bool = False
+) -> tuple[Motion, ...]:
+    """Motions of a CustomJoint: three translations along axes of F, then three body-fixed rotations.
+
+    With `opensim_derivatives` the velocity-dependent accelerations are Simbody's; see
+    :class:`osimlite.mechanics.multibody.motions.SimbodyAccelerationError`.
+
+    Raises:
+        ModelError: an axis has no direction.
+    """
+    slides = tuple(_along("translate", axis) for axis in translations)
+    turns = tuple(_along("rotate", axis) for axis in rotations)
+    return (*slides, SimbodyAccelerationError(turns), *turns) if opensim_derivatives else (*slides, *turns)
+
+
+def _along(kind: Literal["rotate", "translate"], axis: TransformAxis) -> AxisMotion:
+    direction = np.array(axis.axis, dtype=float)
+    length = float(np.linalg.norm(direction))
+    if not 0.0 < length < np.inf:
+        raise ModelError(f"the axis {direction.tolist()} of a transform has no direction; give one that is not zero")
+    return AxisMotion(kind, direction / length, axis.coordinates, axis.function)
+
+
+def motion_types(motions: Sequence[Motion], count: int) -> tuple[MotionType, ...]:
+    """What each of `count` coordinates of a joint does.
+
+    A coordinate that drives an axis with slope exactly 1 or -1 has the motion of that axis (of the last such
+    axis, translations counting after rotations); any other is coupled.
+    """
+    types: list[MotionType] = ["coupled"] * count
+    axes = [axis for motion in motions for axis in motion.elementary() if isinstance(axis, AxisMotion)]
+    for axis in sorted(axes, key=lambda axis: axis.kind):
+        if axis.function.slope in (1.0, -1.0):
+            types[axis.coordinates[0]] = "rotational" if axis.kind == "rotate" else "translational"
+    return tuple(types)
+
+
+@dataclass(frozen=True, eq=False)
+class Mobilizer:
+    """How a body moves in the body (or ground) that carries it.
+
+    The joint says T_PC = X_PF X_FM(q) X_CM⁻¹ for its parent P and child C; `motions` are the factors of X_FM.
+    `reversed` tells that the joint's child carries its parent in the tree: nothing else changes, the speeds
+    still are those of M in F.
+    """
+
+    joint: str  # absolute path of the joint
+    joint_type: str  # OpenSim's class name of the joint, for messages
+    motions: tuple[Motion, ...]  # factors of X_FM
+    coordinates: tuple[int, ...] = ()  # index in the mechanism of each of the joint's coordinates
+    # X_PF (4, 4), the joint's parent frame in its body (or ground)
+    parent_frame: Array = field(default_factory=transform)
+    # X_CM (4, 4), the joint's child frame in its body (or ground)
+    child_frame: Array = field(default_factory=transform)
+    reversed: bool = False
+
+    def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
+        """The way from the carrying to the carried body as fixed transforms and one-axis motions, in order.
+
+        The numbers in ``coordinates`` of each motion are
+        places among `coordinates` of this mobilizer. This is all that a program with one-axis joints
+        needs to know.
+        """
+        motions = (Fixed(self.parent_frame), *self.motions, Fixed(inverse(self.child_frame)))
+        chain = [part for motion in motions for part in motion.elementary()]
+        return tuple(part.inverse() for part in reversed(chain)) if self.reversed else tuple(chain)
+
+    def rate_matrix(self, q: Array) -> Array:
+        """N (k, k) with qdot = N u; SimulationError, which names the joint, where N is singular."""
+        matrix = np.eye(len(q))
+        with _named(self.joint):
+            for motion in self.motions:
+                part = motion.rates(q)
+                if part is not None:
+                    matrix[np.ix_(motion.coordinates, motion.coordinates)] = part
+        return matrix
+
+    def rate_bias(self, q: Array, u: Array) -> Array:
+        """Ndot u (k,), so that qddot = N udot + Ndot u."""
+        bias = np.zeros(len(q))
+        with _named(self.joint):
+            for motion in self.motions:
+                part = motion.rate_bias(q, u)
+                if part is not None:
+                    bias[list(motion.coordinates)] = part
+        return bias
+
+    @cached_property
+    def speeds_are_rates(self) -> bool:
+        """Whether qdot = u for every coordinate of the joint."""
+        return all(type(motion).rates is Motion.rates for motion in self.motions)
+
+    @cached_property
+    def turning(self) -> tuple[tuple[int, ...], ...]:
+        """Index in the mechanism of the coordinates whose rates together follow from as many speeds, set by set."""
+        return tuple(
+            tuple(self.coordinates[place] for place in motion.coordinates)
+            for motion in self.motions
+            if type(motion).rates is not Motion.rates
+        )
+
+
+@contextmanager
+def _named(joint: str) -> Iterator[None]:
+    """Puts the joint's path in front of what a motion has to complain about."""
+    try:
+        yield
+    except SimulationError as error:
+        raise SimulationError(f"{joint}: {error.message}") from None

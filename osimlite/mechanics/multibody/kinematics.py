@@ -1,0 +1,185 @@
+"""Where every body of a mechanism is and how it moves, as the kernels find it.
+
+Arrays over bodies have one row more than there are bodies: the last is ground, which -1, the parent index of a
+body that ground carries, picks out. All vectors are along the axes of ground; spatial velocities and accelerations
+stack the angular part over the linear part of the body's origin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from osimlite.mechanics.kernels.constrained_dynamics import bind
+from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL, WORK
+from osimlite.mechanics.kernels.motion import move, place
+from osimlite.mechanics.kernels.pointers import Floats
+from osimlite.mechanics.multibody.constraints import Constraint, Equations
+from osimlite.mechanics.multibody.program import Program
+from osimlite.mechanics.multibody.spatial import Array, cross, skew, skews, transform
+
+if TYPE_CHECKING:
+    from osimlite.mechanics.multibody.mechanism import Mechanism
+
+
+Vectors = tuple[Floats, Floats, Floats]
+
+
+@contextmanager
+def numbers(data: Floats) -> Iterator[None]:
+    """Whatever Python cannot compute, as an angle that is infinite, leaves no numbers in a work vector."""
+    try:
+        yield
+    except (ArithmeticError, ValueError):
+        np.frombuffer(data)[WORK.SIZE :] = np.nan
+
+
+class Kinematics:
+    """A mechanism of b bodies and n coordinates at one state.
+
+    Args:
+        mechanism: what moves.
+        q: coordinate values (n,).
+        u: generalized speeds (n,).
+        time: what prescribed motions go by (s).
+    """
+
+    def __init__(self, mechanism: Mechanism, q: Array, u: Array, time: float = 0.0) -> None:
+        # What follows from them is computed when it is asked for: nobody may change them until then.
+        self.mechanism, self.q, self.u, self.time = mechanism, q.copy(), u.copy(), time
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Neither the vectors nor the program can be copied, but found again.
+        return Kinematics, (self.mechanism, self.q, self.u, self.time)
+
+    @cached_property
+    def program(self) -> Program:
+        """The mechanism, packed."""
+        return self.mechanism.program
+
+    @cached_property
+    def _unmoved(self) -> Vectors:
+        data, y, f = self.program.state(self.q, self.u)
+        data[WORK.TIME] = self.time
+        return data, y, f
+
+    @cached_property
+    def vectors(self) -> Vectors:
+        """Work vector, state, and rates, when the links have been moved; no numbers where they cannot be."""
+        model, reals, (data, y, f) = self.program.model, self.program.reals, self._unmoved
+        with numbers(data):
+            place(model, reals, data, y, f)
+            move(model, reals, data, y, f)
+        return data, y, f
+
+    def equations(self, constraint: Constraint) -> Equations:
+        """The equations of a constraint."""
+        program = self.program.keeping(constraint)
+        if program is self.program:
+            errors, rows, rates, drifts = self.all_equations
+            first, end, end_position = program.equations_of(constraint)
+            return Equations(errors[first:end_position], rows[first:end], rates[first:end], drifts[first:end])
+        other = Kinematics(self.mechanism, self.q, self.u, self.time)
+        other.program = program
+        return other.equations(constraint)
+
+    @cached_property
+    def all_equations(self) -> Equations:
+        """The equations of all constraints; of those that bind speeds only, the errors mean nothing."""
+        program = self.program
+        balls = [item for item in self.mechanism.turning if not program.bound.isdisjoint(item.coordinates)]
+        for ball in balls:
+            # The rates of its coordinates must be defined.
+            ball.rate_matrix(self.q[list(ball.coordinates)])
+        data, y, f = self.vectors if balls or program.on_bodies else self._unmoved
+        if program.constraints:
+            with numbers(data):
+                bind(program.model, program.reals, data, y, f)
+        return program.equations(data)
+
+    @cached_property
+    def rotations(self) -> Array:
+        """Of each body in ground (b + 1, 3, 3)."""
+        return self._links[:, :9].reshape(-1, 3, 3) @ self.program.frames[:, :3, :3]
+
+    @cached_property
+    def origins(self) -> Array:
+        """Of each body in ground (b + 1, 3), m."""
+        rows = self._links
+        turned = rows[:, :9].reshape(-1, 3, 3) @ self.program.frames[:, :3, 3:]
+        return rows[:, LINK_WORK.POSITION : LINK_WORK.POSITION + 3] + turned[:, :, 0]
+
+    @cached_property
+    def jacobians(self) -> Array:
+        """From the n speeds to the velocity of each body (b + 1, 6, n)."""
+        program, size = self.program, len(self.q)
+        first = program.model[MODEL.WORK_COLUMN]
+        columns = np.frombuffer(self.vectors[0])[first : first + 6 * size].reshape(size, 6)[program.freedoms].T
+        result = np.empty((len(program.links), 6, size))
+        result[:, :3], result[:, 3:] = columns[:3], columns[3:] - skews(self._arms) @ columns[:3]
+        result.swapaxes(1, 2)[program.still] = 0.0
+        return result
+
+    @cached_property
+    def velocities(self) -> Array:
+        """Of each body in ground (b + 1, 6)."""
+        result = self._links[:, LINK_WORK.VELOCITY : LINK_WORK.VELOCITY + 6].copy()
+        result[:, 3:] += np.cross(result[:, :3], self._arms)
+        return result
+
+    @cached_property
+    def biases(self) -> Array:
+        """The accelerations (b + 1, 6) that the bodies have while all udot are zero."""
+        result = self._links[:, LINK_WORK.ACCELERATION : LINK_WORK.ACCELERATION + 6].copy()
+        # Those of the links are of points that pass an origin.
+        w, v = np.split(self.velocities, 2, axis=1)
+        result[:, 3:] += np.cross(result[:, :3], self._arms) + np.cross(w, v)
+        return result
+
+    @cached_property
+    def _links(self) -> Array:
+        """What the kernels find of the link of each body, and of ground as the last (b + 1, LINK_WORK.SIZE)."""
+        model = self.program.model
+        first, count, size = model[MODEL.WORK_LINK], model[MODEL.LINKS], LINK_WORK.SIZE
+        result = np.zeros((count + 1, size))
+        result[:-1] = np.frombuffer(self.vectors[0])[first : first + size * count].reshape(count, size)
+        result[-1, [0, 4, 8]] = 1.0
+        return result[self.program.links]
+
+    @cached_property
+    def _arms(self) -> Array:
+        """From the origin of the spatial vectors to that of each body (b + 1, 3), m."""
+        return self.origins - self._links[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
+
+    def transform(self, body: int) -> Array:
+        """The body in ground (4, 4)."""
+        return transform(self.rotations[body], self.origins[body])
+
+    def point(self, body: int, station: Array) -> Array:
+        """Position in ground (3,) of a `station` (3,) given in the body's frame."""
+        return self.origins[body] + self.rotations[body] @ station
+
+    def point_velocity(self, body: int, station: Array) -> Array:
+        """Velocity in ground (3,) of a `station` (3,) given in the body's frame."""
+        velocity: Array = self.velocities[body]
+        return velocity[3:] + cross(velocity[:3], self.rotations[body] @ station)
+
+    def point_bias(self, body: int, station: Array) -> Array:
+        """Acceleration in ground (3,) of a `station` (3,) of the body while all udot are zero."""
+        arm, w = self.rotations[body] @ station, self.velocities[body][:3]
+        bias: Array = self.biases[body]
+        return bias[3:] + cross(bias[:3], arm) + cross(w, cross(w, arm))
+
+    def point_jacobian(self, body: int, station: Array) -> Array:
+        """Matrix (6, n) from the speeds to the body's angular velocity and the velocity of its `station`."""
+        matrix: Array = self.jacobians[body].copy()
+        matrix[3:] -= skew(self.rotations[body] @ station) @ matrix[:3]
+        return matrix
+
+    def accelerations(self, udot: Array) -> Array:
+        """Spatial accelerations of all bodies (b + 1, 6) for the derivatives `udot` (n,) of the speeds."""
+        return self.biases + self.jacobians @ udot

@@ -1,0 +1,412 @@
+"""A mechanism as links and their motions, packed into the vectors that the kernels work on."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from osimlite.base.records import dataclass, field
+from osimlite.errors import UnsupportedError
+from osimlite.mechanics.kernels.functions import ARC, MONOMIALS, MONOMIALS_OF_OPENSIM
+from osimlite.mechanics.kernels.layout import (
+    CONSTRAINED,
+    CONSTRAINT,
+    DOF,
+    LINK,
+    LINK_WORK,
+    MODEL,
+    MOTION,
+    OPERATION,
+    OPERATION_WORK,
+    TRANSFORM,
+    WORK,
+)
+from osimlite.mechanics.kernels.table import LAW_NUMBERS
+from osimlite.mechanics.multibody.constraint_records import constraint_record, room_for
+from osimlite.mechanics.multibody.constraints import Constraint
+from osimlite.mechanics.multibody.function_tables import function_table
+from osimlite.mechanics.multibody.functions import IDENTITY
+from osimlite.mechanics.multibody.joints import Mobilizer
+from osimlite.mechanics.multibody.motions import (
+    AxisMotion,
+    Fixed,
+    Motion,
+    SimbodyAccelerationError,
+    SphericalMotion,
+)
+from osimlite.mechanics.multibody.parts import GROUND
+from osimlite.mechanics.multibody.spatial import Array, inverse, rotation_about, skew, transform
+
+if TYPE_CHECKING:
+    from osimlite.mechanics.multibody.mechanism import Mechanism
+
+LAWS_OF_FUNCTIONS = {
+    MONOMIALS: "amount_by_several",
+    MONOMIALS_OF_OPENSIM: "amount_by_several",
+    ARC: "amount_by_arc",
+}
+"""The law of each kind of function that takes several coordinates."""
+
+
+class Placement(NamedTuple):
+    """The link that a body belongs to (-1 for ground), and the body's frame (4, 4) in it."""
+
+    link: int
+    frame: Array
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where coordinates and bodies are."""
+
+    mechanism: Mechanism  # of the model
+    freedoms: Mapping[int, int]  # degree of freedom of each coordinate that is free
+    placements: list[Placement]  # of the bodies
+
+    def freedom(self, coordinate: int) -> int:
+        """Degree of freedom of a coordinate, -1 if it is locked."""
+        return self.freedoms.get(coordinate, -1)
+
+    def locked_value(self, coordinate: int) -> float:
+        """Value that a coordinate has if it is locked."""
+        return float(self.mechanism.coordinates[coordinate].default_value)
+
+    def placement(self, body: int) -> Placement:
+        """Link and frame of a body, or of ground."""
+        return self.placements[body] if body != GROUND else Placement(GROUND, np.eye(4))
+
+    def station(self, body: int, point: Sequence[float]) -> tuple[int, tuple[float, ...]]:
+        """Link of a body, and a point of the body in the link."""
+        link, frame = self.placement(body)
+        return link, tuple((frame[:3, :3] @ np.array(point) + frame[:3, 3]).tolist())
+
+    def direction(self, body: int, vector: Sequence[float]) -> tuple[float, ...]:
+        """A direction of a body in its link."""
+        return tuple((self.placement(body).frame[:3, :3] @ np.array(vector)).tolist())
+
+    def frame(self, body: int, frame: Array) -> tuple[int, list[float]]:
+        """Link of a body, and axes and origin in the link of a frame (4, 4) of the body."""
+        link, of_body = self.placement(body)
+        return link, (of_body @ frame)[:3].T.ravel().tolist()
+
+
+@dataclass
+class Operation:
+    """A fixed transform, and one motion after it."""
+
+    kind: int
+    before: Array
+    arguments: list[int]  # places in the mechanism
+    function: Any = None
+    radii: Array = field(default_factory=lambda: np.zeros(3))
+    axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))  # of a slide
+    turns: list[Operation | None] = field(default_factory=list)  # of a drift
+    looked_at: list[int] = field(default_factory=list)  # by a drift: its sign, and two places in the mechanism
+    joint: str = ""
+
+
+@dataclass
+class Link:
+    """A body, or several that never move in one another, with its way from the link that carries it."""
+
+    parent: int
+    operations: list[Operation]
+    mass: float = 0.0
+    first: Array = field(default_factory=lambda: np.zeros(3))  # first moment
+    second: Array = field(default_factory=lambda: np.zeros((3, 3)))  # inertia about the link's origin
+
+
+class Tree(NamedTuple):
+    """The links of a mechanism."""
+
+    links: list[Link]
+    ends: list[int]  # of the degrees of freedom of each link, behind the first of all
+    order: tuple[int, ...]  # place in the mechanism of the coordinate of each degree of freedom
+    places: Places  # of all that stands on the links
+
+
+def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False) -> Tree:
+    """The links of a mechanism.
+
+    Args:
+        mechanism: what moves.
+        free: places of the coordinates that are degrees of freedom; the others stay at their defaults.
+        apart: whether bodies that never move in one another are links of their own.
+
+    Raises:
+        UnsupportedError: a joint that the kernels do not know.
+    """
+    links: list[Link] = []
+    placements: list[Placement] = []
+    free = set(free)
+    for body in mechanism.bodies:
+        parent, frame = (GROUND, np.eye(4)) if body.parent == GROUND else placements[body.parent]
+        operations, rest = _operations(mechanism, body.mobilizer, frame, free)
+        if operations or apart:
+            links.append(Link(parent, operations))
+            parent = len(links) - 1
+        placements.append(Placement(parent, rest))
+        if parent != GROUND:
+            _load(links[parent], body.mass_properties, rest)
+    order: list[int] = []
+    ends = [0]
+    for link in links:
+        own = {place for item in link.operations for place in item.arguments}
+        order += sorted(own & free)
+        ends.append(len(order))
+    freedoms = {place: number for number, place in enumerate(order)}
+    return Tree(links, ends, tuple(order), Places(mechanism, freedoms, placements))
+
+
+def _operations(
+    mechanism: Mechanism, mobilizer: Mobilizer, frame: Array, free: set[int]
+) -> tuple[list[Operation], Array]:
+    """The motions of a joint from a frame of the carrying link on, and the carried body after the last of them."""
+    own = mobilizer.coordinates
+    chain: list[Motion] = [Fixed(mobilizer.parent_frame), *mobilizer.motions, Fixed(inverse(mobilizer.child_frame))]
+    if mobilizer.reversed:
+        chain.reverse()
+    result: list[Operation] = []
+    of_motion: dict[int, Operation] = {}
+    drifts: list[tuple[Operation, SimbodyAccelerationError]] = []
+    for motion in chain:
+        places = [own[number] for number in motion.coordinates]
+        still = free.isdisjoint(places)
+        if isinstance(motion, Fixed):
+            frame = frame @ (inverse(motion.matrix) if mobilizer.reversed else motion.matrix)
+        elif isinstance(motion, SimbodyAccelerationError):
+            if motion.elementary() and not free.isdisjoint(own):
+                sign = -1 if mobilizer.reversed else 1
+                result.append(Operation(MOTION.ACCELERATION_ERROR, frame, [], looked_at=[sign, *own[:2]]))
+                drifts.append((result[-1], motion))
+                frame = np.eye(4)
+        elif still:
+            q = np.zeros(len(own))
+            q[list(motion.coordinates)] = [mechanism.coordinates[place].default_value for place in places]
+            matrix = motion.placed(q)
+            frame = frame @ (inverse(matrix) if mobilizer.reversed else matrix)
+        elif isinstance(motion, AxisMotion):
+            axis = -motion.axis if mobilizer.reversed else motion.axis
+            function = None if motion.function == IDENTITY else motion.function
+            if motion.kind == "rotate":
+                turned = transform(_to_axis(axis))
+                result.append(Operation(MOTION.TURN, frame @ turned, places, function))
+                of_motion[id(motion)] = result[-1]
+                frame = inverse(turned)
+            else:
+                result.append(Operation(MOTION.SLIDE, frame, places, function, axis=axis))
+                frame = np.eye(4)
+        elif isinstance(motion, SphericalMotion):
+            kind = MOTION.BALL_BACK if mobilizer.reversed else MOTION.BALL
+            result.append(Operation(kind, frame, places, radii=motion.radii))
+            frame = np.eye(4)
+        else:
+            raise UnsupportedError(f"the {type(motion).__name__} of '{mobilizer.joint}' cannot be computed")
+    for operation in result:
+        operation.joint = mobilizer.joint
+    for operation, drift in drifts:
+        operation.turns = [of_motion.get(id(turn)) for turn in drift.turns]
+    return result, frame
+
+
+def _to_axis(axis: Array) -> Array:
+    """A rotation (3, 3) that takes z to a unit vector; without rounding if that is a coordinate axis."""
+    x, y, z = axis.tolist()
+    if z == 1.0:
+        return np.eye(3)
+    if abs(x) == 1.0 or abs(y) == 1.0 or z == -1.0:
+        other = np.array((abs(y), abs(z), abs(x)))
+        return np.column_stack((other, np.cross(axis, other), axis))
+    angle = float(np.arctan2(np.hypot(x, y), z))
+    return rotation_about(np.array((-y, x, 0.0)) / np.hypot(x, y), angle)
+
+
+def _load(link: Link, properties: Any, frame: Array) -> None:
+    """Add the mass of a body to its link."""
+    rotation = frame[:3, :3]
+    center = rotation @ properties.center + frame[:3, 3]
+    link.mass += properties.mass
+    link.first = link.first + properties.mass * center
+    link.second = link.second + rotation @ properties.inertia @ rotation.T - properties.mass * _square(center)
+
+
+def _square(v: Array) -> Array:
+    """[v] [v], the inertia of a unit mass at v but for the sign."""
+    return skew(v) @ skew(v)
+
+
+def _inertia(link: Link) -> list[float]:
+    center = link.first / link.mass if link.mass != 0.0 else link.first
+    i = link.second + link.mass * _square(center)
+    return [link.mass, *center.tolist(), i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
+
+
+class LinkPacker:
+    """Puts all that makes a mechanism at its place in the vectors."""
+
+    def __init__(self, tree: Tree) -> None:
+        self.links, self.ends, self.order, self.places = tree
+        self.operations = [operation for link in self.links for operation in link.operations]
+        self.ints: list[int] = [0] * (MODEL.LAWS + len(LAW_NUMBERS))
+        self.numbers: list[float] = [float(x) for x in self.places.mechanism.gravity]
+        self.work = WORK.SIZE
+        self.entries = 0
+        self.balls: dict[tuple[int, ...], int] = {}
+        self.laws: list[str] = ["evaluate"]
+
+    def mechanism_records(self, kept: Sequence[Constraint], locks: int = 0) -> None:
+        """Write the mechanism.
+
+        Args:
+            kept: the constraints that are kept up.
+            locks: how many coordinates are locked besides.
+        """
+        ints, size = self.ints, len(self.order)
+        for link in self.links:
+            self.numbers += _inertia(link)
+        ints[MODEL.FIXED_AT] = len(self.numbers)
+        for operation in self.operations:
+            before = operation.before
+            self.numbers += [*before[:3, :3].ravel().tolist(), *before[:3, 3].tolist(), *operation.axis.tolist()]
+        ints[MODEL.LINKS], ints[MODEL.DOFS] = len(self.links), size
+        ints[MODEL.WORK_LINK] = self.room(LINK_WORK.SIZE * len(self.links))
+        ints[MODEL.WORK_OPERATION] = self.room(OPERATION_WORK.SIZE * len(self.operations))
+        ints[MODEL.WORK_COLUMN], ints[MODEL.WORK_PIVOT] = self.room(6 * size), self.room(size)
+        above = self.link_records()
+        self.freedom_records(above)
+        self.operation_records()
+        self.constraint_records(kept, locks)
+
+    def room(self, count: int) -> int:
+        """Place of some more numbers in the work vector."""
+        self.work += count
+        return self.work - count
+
+    def law(self, name: str) -> int:
+        """Number of a law, which must then be there."""
+        self.laws.append(name)
+        return LAW_NUMBERS[name]
+
+    def link_records(self) -> list[int]:
+        """Write the links; returns the degree of freedom above each."""
+        self.ints[MODEL.LINK_AT] = len(self.ints)
+        above, carrying, operation = [-1] * self.ends[-1], [-1] * len(self.links), 0
+        for number, link in enumerate(self.links):
+            first, end = self.ends[number], self.ends[number + 1]
+            behind = operation + len(link.operations)
+            self.ints += LINK.record(
+                PARENT=link.parent, FIRST_OPERATION=operation, END_OPERATION=behind, FIRST_DOF=first, END_DOF=end
+            )
+            operation = behind
+            last = carrying[link.parent] if link.parent >= 0 else -1
+            for freedom in range(first, end):
+                above[freedom], last = last, freedom
+            carrying[number] = last
+        return above
+
+    def freedom_records(self, above: Sequence[int]) -> None:
+        """Write the degrees of freedom, and the list of those whose columns are sums."""
+        self.ints[MODEL.DOF_AT] = len(self.ints)
+        depths: list[int] = []
+        for freedom in above:
+            depths.append(depths[freedom] + 1 if freedom >= 0 else 0)
+            self.ints += DOF.record(ABOVE=freedom, ROW=self.room(depths[-1] + 1), DEPTH=depths[-1])
+            self.entries += depths[-1] + 1
+        self.ints[MODEL.SUMMED_AT] = len(self.ints)
+        summed = [number for number in range(len(above)) if number not in self.simple_freedoms]
+        self.ints[MODEL.SUMMED] = len(summed)
+        self.ints += summed
+
+    @cached_property
+    def simple_freedoms(self) -> set[int]:
+        """Degrees of freedom that are the amount of one operation about or along one axis, and nothing else."""
+        users: dict[int, list[Operation]] = {}
+        for item in self.operations:
+            for freedom in {self.places.freedom(place) for place in item.arguments}:
+                users.setdefault(freedom, []).append(item)
+        return {
+            freedom
+            for freedom, (first, *others) in users.items()
+            if not others and first.function is None and first.kind in (MOTION.TURN, MOTION.SLIDE)
+        }
+
+    def operation_records(self) -> None:
+        """Write the operations, and what their functions need."""
+        start = self.ints[MODEL.OPERATION_AT] = len(self.ints)
+        self.ints += [0] * (OPERATION.SIZE * len(self.operations))
+        numbers = {id(item): number for number, item in enumerate(self.operations)}
+        for number, item in enumerate(self.operations):
+            freedom, law, gradient = -1, OPERATION.ALONE, 0
+            extra = len(self.numbers)
+            freedoms = [self.places.freedom(place) for place in item.arguments]
+            looked_at: list[int] = []
+            if item.kind == MOTION.ACCELERATION_ERROR:
+                law = self.law("place_drift")
+                self.law("move_drift")
+                sign, *watched = item.looked_at
+                looked_at = [sign, *(self.places.freedom(place) for place in watched), *[-1] * (2 - len(watched))]
+                looked_at += [-1 if turn is None else numbers[id(turn)] for turn in item.turns]
+            elif item.kind in (MOTION.BALL, MOTION.BALL_BACK):
+                law = self.law("place_ball")
+                self.law("move_ball")
+                self.numbers += item.radii.tolist()
+            elif item.function is None:
+                freedom = freedoms[0]
+                law = OPERATION.ALONE if freedom in self.simple_freedoms else OPERATION.TOGETHER
+            else:
+                infos = [self.places.mechanism.coordinates[place] for place in item.arguments]
+                table = function_table(item.function, f"the function of an axis of the joint '{infos[0].joint}'")
+                law = self.law(LAWS_OF_FUNCTIONS.get(int(table[0]), "amount_by_one"))
+                self.numbers += [*(info.default_value for info in infos), *table]
+                gradient = self.room(len(freedoms))
+            arguments = len(self.ints)
+            self.ints += [*freedoms, *looked_at]
+            if item.kind in (MOTION.BALL, MOTION.BALL_BACK):
+                self.balls[tuple(freedoms)] = arguments
+            self.ints[start + OPERATION.SIZE * number : start + OPERATION.SIZE * (number + 1)] = OPERATION.record(
+                MOTION=item.kind, BEFORE=_kind_of(item.before), DOF=freedom, FUNCTION=law,
+                ARGUMENTS=arguments, ARGUMENT_COUNT=len(freedoms), EXTRA=extra, GRADIENT=gradient,
+            )  # fmt: skip
+
+    def constraint_records(self, kept: Sequence[Constraint], locks: int) -> None:
+        """Write what constraints need, if there are any."""
+        if not kept:
+            return
+        start, size = len(self.ints), self.ints[MODEL.DOFS]
+        self.ints[MODEL.CONSTRAINED] = start
+        self.ints += [0] * CONSTRAINED.SIZE
+        constraints = [constraint_record(item, self.places, self.balls) for item in kept]
+        records: list[int] = []
+        equations = 0
+        for constraint in constraints:
+            records.append(len(self.ints))
+            end, end_position = equations + constraint.equations, equations + constraint.positions
+            ints = [
+                x + self.room(constraint.room) if k == constraint.room_at else x for k, x in enumerate(constraint.ints)
+            ]
+            self.ints += CONSTRAINT.record(
+                LAW=self.law(constraint.law), NUMBERS=len(self.numbers),
+                FIRST_EQUATION=equations, END_EQUATION=end, END_POSITION=end_position,
+            )  # fmt: skip
+            self.ints += ints
+            self.numbers += constraint.numbers
+            equations = end
+        record_at, ball_at = len(self.ints), len(self.ints) + len(records)
+        self.ints += [*records, *self.balls.values()]
+        self.ints[start : start + CONSTRAINED.SIZE] = CONSTRAINED.record(
+            DYNAMICS=self.law("constrained_dynamics"), PROJECT=self.law("project"),
+            FACTORISE=self.law("factorise_law"), MINIMUM_NORM=self.law("minimum_norm_law"),
+            CONSTRAINTS=len(constraints), CONSTRAINT_AT=record_at, BALLS=len(self.balls), BALL_AT=ball_at,
+            EQUATIONS=equations, POSITIONS=sum(constraint.positions for constraint in constraints),
+            LOCKS=locks, ENTRIES=self.entries,
+            **{name: self.room(count) for name, count in room_for(equations, size, self.entries).items()},
+        )  # fmt: skip
+
+
+def _kind_of(matrix: Array) -> int:
+    if not np.array_equal(matrix[:3, :3], np.eye(3)):
+        return TRANSFORM.MOVE
+    return TRANSFORM.SHIFT if matrix[:3, 3].any() else TRANSFORM.NOTHING

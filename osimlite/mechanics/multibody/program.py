@@ -1,0 +1,134 @@
+"""A mechanism in the vectors of the kernels, which run on it as Python.
+
+:mod:`osimlite.mechanics.kernels.layout` says what is where. Every state has a work vector of its own, so that nothing that is
+known of one changes with another.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from osimlite.mechanics.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, GRAVITY_AT, MODEL
+from osimlite.mechanics.kernels.pointers import Floats, Ints, address
+from osimlite.mechanics.kernels.table import LAW_NUMBERS, own_function
+from osimlite.mechanics.multibody.constraints import Constraint, Equations
+from osimlite.mechanics.multibody.functions import floats
+from osimlite.mechanics.multibody.links import LinkPacker, Tree
+from osimlite.mechanics.multibody.parts import GROUND
+from osimlite.mechanics.multibody.spatial import Array
+
+_ENDS = CONSTRAINT.FIRST_EQUATION, CONSTRAINT.END_EQUATION, CONSTRAINT.END_POSITION
+
+
+class Program:
+    """A mechanism all of whose coordinates are free, packed.
+
+    Args:
+        tree: the links, with all coordinates as degrees of freedom.
+        constraints: that are kept up.
+
+    Attributes:
+        s: the integers, with addresses that are good in this process.
+        x: the numbers, without gravity.
+        heavy: the numbers, with gravity.
+        laws: names of the laws that are called.
+        tree: the links, as given.
+        order: place in the mechanism of the coordinate of each degree of freedom.
+        freedoms: degree of freedom of each coordinate.
+        links: link of each body, and of ground as the last (b + 1,); -1 for ground.
+        frames: each body in its link (b + 1, 4, 4).
+        constraints: number of each constraint, by its identity.
+        bound: the coordinates that constraints speak of.
+        on_bodies: whether a constraint speaks of bodies.
+    """
+
+    def __init__(self, tree: Tree, constraints: Sequence[Constraint]) -> None:
+        packer = LinkPacker(tree)
+        packer.mechanism_records(constraints)
+        ints, order = packer.ints, tree.order
+        ints[MODEL.STATE_SIZE], ints[MODEL.WORK_SIZE] = 2 * len(order), packer.work
+        self.laws, self.tree = [*dict.fromkeys(packer.laws)], tree
+        for name in self.laws:
+            ints[MODEL.LAWS + LAW_NUMBERS[name]] = address(own_function(name))
+        integers: Any = memoryview(array("q", ints))
+        self.model: Ints = integers
+        self.reals, self.heavy = floats(packer.numbers), floats(packer.numbers)
+        for k in range(GRAVITY_AT, GRAVITY_AT + 3):
+            self.reals[k] = 0.0
+        self.order = list(order)
+        self.freedoms = np.argsort(order)
+        self.constraints = {id(item): number for number, item in enumerate(constraints)}
+        self.bound = frozenset(place for item in constraints for place in item.coordinates)
+        self.on_bodies = any(item.bodies for item in constraints)
+        placements = [*tree.places.placements, tree.places.placement(GROUND)]
+        self.links = np.array([item.link for item in placements])
+        self.frames = np.array([item.frame for item in placements])
+        # What has an identity is kept, lest another gets it.
+        self._kept = [*constraints]
+        self._others: dict[int, Program] = {}
+
+    def keeping(self, constraint: Constraint) -> Program:
+        """This, if the constraint is one of its own, or the program that has it alone."""
+        if id(constraint) in self.constraints:
+            return self
+        if id(constraint) not in self._others:
+            self._others[id(constraint)] = Program(self.tree, (constraint,))
+        return self._others[id(constraint)]
+
+    def equations_of(self, constraint: Constraint) -> tuple[int, int, int]:
+        """First and end of the equations of a constraint of its own, and the end of those that bind positions."""
+        s = self.model
+        at = s[s[s[MODEL.CONSTRAINED] + CONSTRAINED.CONSTRAINT_AT] + self.constraints[id(constraint)]]
+        return tuple(s[at + k] for k in _ENDS)
+
+    def equations(self, data: Floats) -> Equations:
+        """All equations as they stand in a work vector."""
+        size = len(self.order)
+        if not self.constraints:
+            return Equations(np.zeros(0), np.zeros((0, size)), np.zeros(0), np.zeros(0))
+        h, vector = self.model[self.model[MODEL.CONSTRAINED] :], np.frombuffer(data)
+        count = h[CONSTRAINED.EQUATIONS]
+        rows = vector[h[CONSTRAINED.WORK_ROWS] :][: count * size].reshape(count, size)[:, self.freedoms]
+        places = (CONSTRAINED.WORK_ERRORS, CONSTRAINED.WORK_RATES, CONSTRAINED.WORK_DRIFTS)
+        errors, rates, drifts = (vector[h[place] :][:count].copy() for place in places)
+        return Equations(errors, rows, rates, drifts)
+
+    @cached_property
+    def still(self) -> NDArray[np.bool_]:
+        """Whether each body (and ground as the last) stays when a coordinate moves (b + 1, n)."""
+        links, ends, order, _ = self.tree
+        still = np.ones((len(links) + 1, len(order)), dtype=bool)
+        for number, link in enumerate(links):
+            still[number] = still[link.parent]
+            still[number, list(order[ends[number] : ends[number + 1]])] = False
+        return np.asarray(still[self.links])
+
+    @cached_property
+    def _entries(self) -> NDArray[np.int_]:
+        """Row, column, and place in the work vector of each entry of the mass matrix that is not zero (3, k)."""
+        s, entries = self.model, []
+        for freedom in range(len(self.order)):
+            record = s[s[MODEL.DOF_AT] + DOF.SIZE * freedom :]
+            above, place = freedom, record[DOF.ROW]
+            while above >= 0:
+                entries.append((self.order[freedom], self.order[above], place))
+                above, place = s[s[MODEL.DOF_AT] + DOF.SIZE * above + DOF.ABOVE], place + 1
+        return np.array(entries, dtype=int).reshape(-1, 3).T
+
+    def mass_matrix(self, data: Floats) -> Array:
+        """The mass matrix (n, n) as it stands in a work vector."""
+        (rows, columns, places), size = self._entries, len(self.order)
+        matrix = np.zeros((size, size))
+        matrix[rows, columns] = matrix[columns, rows] = np.frombuffer(data)[places]
+        return matrix
+
+    def state(self, q: Array, u: Array) -> tuple[Floats, Floats, Floats]:
+        """A work vector for a state, the state, and its rates, as they are but for balls."""
+        values, speeds = q[self.order].tolist(), u[self.order].tolist()
+        return floats(bytes(8 * self.model[MODEL.WORK_SIZE])), floats([*values, *speeds]), floats([*speeds, *speeds])

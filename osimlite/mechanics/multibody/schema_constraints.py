@@ -1,0 +1,149 @@
+"""From the constraints of a model to equations between coordinates and bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from osimlite.base.records import dataclass
+from osimlite.base.text import listed
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.mechanics.multibody import body_constraints as b
+from osimlite.mechanics.multibody.constraints import Constraint, Coupler
+from osimlite.mechanics.multibody.functions import Scaled
+from osimlite.mechanics.multibody.parts import FramePlacement, StationPlacement
+from osimlite.mechanics.multibody.schema_frames import Placements
+from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema import constraint_types as schema
+from osimlite.schema.base import Component
+from osimlite.schema.constraints import Constraint as SchemaConstraint
+
+
+@dataclass(frozen=True, eq=False)
+class ConstraintReader:
+    """Makes constraints of a mechanism from those of a model."""
+
+    placements: Placements  # of the model's frames
+    bodies: Mapping[str, int]  # index in the mechanism of every body and ground, by absolute path
+    coordinates: Mapping[str, int]  # index in the mechanism of every coordinate, by absolute path
+    opensim_derivatives: bool  # see `build_mechanism`
+
+    def constraint(self, constraint: SchemaConstraint) -> Constraint:
+        """The equations of an enforced constraint.
+
+        Raises:
+            ModelError: it names what does not exist, or its function, a direction or a distance is impossible.
+            UnsupportedError: a constraint of another class.
+        """
+        make = _READERS.get(type(constraint))
+        path = self.placements.path(constraint)
+        if make is None:
+            raise unknown_constraint(path, type(constraint).__name__)
+        return make(self, constraint, path)
+
+    def _base(self, owner: Component, socket: str) -> int:
+        return self.bodies[self.placements.frame(self.placements.named(owner, socket))[0]]
+
+    def _station(self, owner: Component, socket: str, location: str) -> StationPlacement:
+        # OpenSim takes the location in the body itself, even where the socket names a frame that is off the body's.
+        return StationPlacement(self._base(owner, socket), np.array(getattr(owner, location), dtype=float))
+
+    def _frame(self, owner: Component, socket: str) -> FramePlacement:
+        base, matrix = self.placements.frame(self.placements.named(owner, socket))
+        return FramePlacement(self.bodies[base], matrix)
+
+    def _coordinate(self, owner: Component, field: str, value: str | Component) -> int:
+        path = self.placements.path(self.placements.tree.target(owner, field, value))
+        if path not in self.coordinates:
+            # Of a coordinate that stands several times in a joint, only the first moves something.
+            raise ModelError(
+                f"the {field} of '{self.placements.path(owner)}' is '{path}', which moves nothing; "
+                "give it a coordinate that a joint moves by"
+            )
+        return self.coordinates[path]
+
+    def coupler(self, item: schema.CoordinateCouplerConstraint, path: str) -> Constraint:
+        """One coordinate as a function of others."""
+        names = item.independent_coordinate_names
+        function = numeric(
+            item.coupled_coordinates_function,
+            len(names),
+            f"the function of '{path}'",
+            opensim_derivatives=self.opensim_derivatives,
+        )
+        return Coupler(
+            self._coordinate(item, "dependent_coordinate_name", item.dependent_coordinate_name),
+            tuple(self._coordinate(item, "independent_coordinate_names", name) for name in names),
+            function if item.scale_factor == 1.0 else Scaled(item.scale_factor, function),
+            path,
+        )
+
+    def point(self, item: schema.PointConstraint, path: str) -> Constraint:
+        """Two stations on each other."""
+        return b.PointConstraint(
+            self._station(item, "socket_body_1", "location_body_1"),
+            self._station(item, "socket_body_2", "location_body_2"),
+            path,
+        )
+
+    def distance(self, item: schema.ConstantDistanceConstraint, path: str) -> Constraint:
+        """Two stations at a distance."""
+        if not 0.0 < item.constant_distance < np.inf:
+            raise ModelError(f"'{path}' has a distance of {item.constant_distance:g}; give a positive length in m")
+        return b.DistanceConstraint(
+            self._station(item, "socket_body_1", "location_body_1"),
+            self._station(item, "socket_body_2", "location_body_2"),
+            item.constant_distance,
+            path,
+        )
+
+    def on_line(self, item: schema.PointOnLineConstraint, path: str) -> Constraint:
+        """A station on a line."""
+        return b.PointOnLineConstraint(
+            self._station(item, "socket_line_body", "point_on_line"),
+            _direction(item.line_direction_vec, f"the line of '{path}'"),
+            self._station(item, "socket_follower_body", "point_on_follower"),
+            path,
+        )
+
+    def rolling(self, item: schema.RollingOnSurfaceConstraint, path: str) -> Constraint:
+        """A roller on a plane."""
+        return b.RollingConstraint(
+            self._base(item, "socket_surface_body"),
+            self._base(item, "socket_rolling_body"),
+            _direction(item.surface_normal, f"the surface of '{path}'"),
+            item.surface_height,
+            path,
+        )
+
+    def weld(self, item: schema.WeldConstraint, path: str) -> Constraint:
+        """Two frames on each other."""
+        return b.WeldConstraint(self._frame(item, "socket_frame1"), self._frame(item, "socket_frame2"), path)
+
+
+def unknown_constraint(path: str, kind: str) -> UnsupportedError:
+    """The error for a constraint that cannot be computed."""
+    return UnsupportedError(
+        f"the constraint '{path}' ({kind}) cannot be computed; set its isEnforced to false or remove it; "
+        f"those osimlite computes are {listed([item.__name__ for item in _READERS], most=len(_READERS))}"
+    )
+
+
+def _direction(vector: tuple[float, float, float], what: str) -> Array:
+    direction = np.array(vector, dtype=float)
+    length = float(np.linalg.norm(direction))
+    if not 0.0 < length < np.inf:
+        raise ModelError(f"{what} has no direction; give a vector that is not zero")
+    return direction / length
+
+
+_READERS: dict[type[SchemaConstraint], Callable[..., Constraint]] = {
+    schema.CoordinateCouplerConstraint: ConstraintReader.coupler,
+    schema.PointConstraint: ConstraintReader.point,
+    schema.ConstantDistanceConstraint: ConstraintReader.distance,
+    schema.PointOnLineConstraint: ConstraintReader.on_line,
+    schema.RollingOnSurfaceConstraint: ConstraintReader.rolling,
+    schema.WeldConstraint: ConstraintReader.weld,
+}

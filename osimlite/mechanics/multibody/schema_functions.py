@@ -1,0 +1,150 @@
+"""From the function components of a model to functions that can be evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from itertools import pairwise
+from math import isfinite
+from typing import Any
+
+from osimlite.base.text import listed
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.mechanics.multibody import functions as f
+from osimlite.schema import functions as schema
+from osimlite.schema.base import Object, Unknown
+
+
+def numeric(function: Object | None, arguments: int, where: str, *, opensim_derivatives: bool = False) -> f.Function:
+    """The function that a component of a model describes.
+
+    Args:
+        function: one of OpenSim's functions.
+        arguments: how many arguments it will get.
+        where: the path and property it stands in, for messages.
+        opensim_derivatives: give a multivariate polynomial the second derivatives that OpenSim takes for them.
+
+    Raises:
+        ModelError: there is no function, or it is not a function of this many arguments, or has impossible values.
+        UnsupportedError: a function of another class.
+    """
+    if function is None:
+        raise ModelError(f"{where} is missing; give one, for instance a LinearFunction")
+    kind = type(function)
+    try:
+        if isinstance(function, schema.MultiplierFunction):
+            inner = numeric(function.function, arguments, where, opensim_derivatives=opensim_derivatives)
+            return f.Scaled(function.scale, inner)
+        if isinstance(function, schema.MultivariatePolynomialFunction):
+            _takes(function, function.dimension, arguments)
+            return f.MultivariatePolynomial.complete(
+                function.coefficients, function.dimension, function.order, opensim_derivatives=opensim_derivatives
+            )
+        if isinstance(function, schema.LinearFunction):
+            return _linear(function, arguments)
+        if isinstance(function, schema.Constant):
+            return f.Constant(function.value)
+        if kind not in _UNIVARIATE:
+            name = function.class_name if isinstance(function, Unknown) else kind.__name__
+            can = ["Constant", "LinearFunction", "MultiplierFunction", "MultivariatePolynomialFunction"]
+            can += [item.__name__ for item in _UNIVARIATE]
+            raise UnsupportedError(
+                f"{where} is a {name}, which osimlite cannot differentiate twice; "
+                f"the functions it can are {listed(can, most=len(can))}"
+            )
+        _takes(function, 1, arguments)
+        return _UNIVARIATE[kind](function)
+    except _Impossible as problem:
+        raise ModelError(f"{where} ({kind.__name__}): {problem}") from None
+
+
+class _Impossible(Exception):
+    """What is wrong with a function, and what to do, without its place."""
+
+
+def _takes(function: Object, wanted: int, given: int) -> None:
+    if given != wanted:
+        raise _Impossible(f"it is a function of {wanted} variables and gets {given}; list as many coordinates")
+
+
+def _linear(function: schema.LinearFunction, arguments: int) -> f.Function:
+    count = len(function.coefficients)
+    if count <= arguments:
+        raise _Impossible(f"it has {count} coefficients; give {arguments + 1}, the constant last")
+    # OpenSim takes the coefficient behind the weights for the constant, and ignores the others.
+    weights, start = function.coefficients[:arguments], function.coefficients[arguments]
+    return f.Linear(weights[0], start) if arguments == 1 else f.WeightedSum(weights, start)
+
+
+def _points(function: Any, least: int, *, apart: bool = False) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the abscissae and ordinates of a function that goes through points, checked.
+
+    Args:
+        function: with properties `x` and `y`; ordinates beyond the last abscissa are ignored, as in
+            OpenSim.
+        least: the number of points that it needs.
+        apart: whether no two abscissae may be equal.
+    """
+    x = tuple(function.x)
+    y = tuple(function.y)[: len(x)]
+    if len(x) != len(y) or len(x) < least:
+        raise _Impossible(f"it has {len(x)} x and {len(y)} y; give as many of both, at least {least}")
+    if not all(map(isfinite, (*x, *y))):
+        raise _Impossible("a point is not finite; give numbers")
+    if any(after < before or (apart and after == before) for before, after in pairwise(x)):
+        repeated = " and remove repeated ones" if apart else ""
+        raise _Impossible(f"its x do not increase; sort the points{repeated}")
+    return x, y
+
+
+def _piecewise_linear(function: schema.PiecewiseLinearFunction) -> f.Function:
+    x, y = _points(function, 1)
+    if len(x) == 1:
+        return f.Constant(y[0])
+    if x[0] == x[1] or x[-1] == x[-2]:
+        # The line that continues outside of the points would be vertical.
+        raise _Impossible("its first or last two x are equal; remove one of them")
+    return f.PiecewiseLinear(x, y)
+
+
+def _piecewise_constant(function: schema.PiecewiseConstantFunction) -> f.Function:
+    x, y = _points(function, 1)
+    return f.PiecewiseConstant(x, y) if len(x) > 1 else f.Constant(y[0])
+
+
+def _gcv(function: schema.GCVSpline) -> f.Function:
+    half_order = function.half_order
+    if half_order < 1:
+        raise _Impossible(f"its half_order is {half_order}; give 1 or more, 2 for a cubic spline")
+    x, y = _points(function, 2 * half_order, apart=True)
+    # The linter values what it can without numpy.
+    splines: Any = import_module("osimlite.mechanics.multibody.smoothing_spline")
+    made: f.Function = splines.smoothing_spline(x, y, half_order, function.error_variance)
+    return made
+
+
+def _step(function: schema.StepFunction) -> f.Function:
+    start, end = function.transition_start_time, function.transition_end_time
+    if start > end:
+        # OpenSim follows the same curve from its other end.
+        return f.Step(end, start, function.end_value, function.start_value)
+    if not start < end:
+        raise _Impossible(f"its transition ends where it starts, at {end:g}; let it end elsewhere")
+    return f.Step(start, end, function.start_value, function.end_value)
+
+
+def _floats(values: Sequence[float]) -> tuple[float, ...]:
+    if not values:
+        raise _Impossible("it has no coefficients; give at least one")
+    return tuple(float(value) for value in values)
+
+
+_UNIVARIATE: dict[type[Object], Callable[[Any], f.Function]] = {
+    schema.PolynomialFunction: lambda item: f.Polynomial(_floats(item.coefficients)),
+    schema.Sine: lambda item: f.Sine(item.amplitude, item.omega, item.phase, item.offset),
+    schema.StepFunction: _step,
+    schema.PiecewiseConstantFunction: _piecewise_constant,
+    schema.PiecewiseLinearFunction: _piecewise_linear,
+    schema.SimmSpline: lambda item: f.SimmSpline(*_points(item, 2)),
+    schema.GCVSpline: _gcv,
+}

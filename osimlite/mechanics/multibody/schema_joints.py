@@ -1,0 +1,111 @@
+"""From the joints of a model to motions: which coordinates a joint has, in which order, and what they do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from osimlite.base.text import listed
+from osimlite.errors import ModelError, UnsupportedError
+from osimlite.mechanics.multibody.joints import (
+    MOTIONS,
+    TransformAxis,
+    constant_curvature,
+    custom,
+    ellipsoid,
+    scapulothoracic,
+)
+from osimlite.mechanics.multibody.motions import Motion
+from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.schema import custom_joint as schema
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.joints import (
+    ConstantCurvatureJoint,
+    EllipsoidJoint,
+    Joint,
+    ScapulothoracicJoint,
+)
+
+JOINT_TYPES = (*MOTIONS, "EllipsoidJoint", "ScapulothoracicJoint", "ConstantCurvatureJoint", "CustomJoint")
+"""OpenSim's joint classes that osimlite computes."""
+
+
+def joint_motions(
+    joint: Joint, path: str, *, opensim_derivatives: bool = False
+) -> tuple[tuple[Motion, ...], Sequence[Coordinate]]:
+    """The factors of X_FM of a joint, and its coordinates in the order that the factors count them in.
+
+    Raises:
+        ModelError: a wrong number of coordinates, an axis or a function that cannot be, radii that are no numbers.
+        UnsupportedError: a joint or a function of another class.
+    """
+    kind, coordinates = type(joint).__name__, list(joint.coordinates)
+    if isinstance(joint, schema.CustomJoint):
+        return _custom(joint, path, opensim_derivatives)
+    if isinstance(joint, EllipsoidJoint):
+        motions = ellipsoid(_radii(joint.radii_x_y_z, path))
+    elif isinstance(joint, ScapulothoracicJoint):
+        motions = scapulothoracic(
+            _radii(joint.thoracic_ellipsoid_radii_x_y_z, path),
+            joint.scapula_winging_axis_origin,
+            joint.scapula_winging_axis_direction,
+        )
+    elif isinstance(joint, ConstantCurvatureJoint):
+        if not 0.0 < joint.length < np.inf:
+            raise ModelError(f"the rod of '{path}' has the length {joint.length:g}; give a positive length in m")
+        motions = constant_curvature(joint.length, joint.neutral_angle_x_z_y)
+    elif kind in MOTIONS:
+        motions = MOTIONS[kind]
+    else:
+        raise unknown_joint(path, kind)
+    needed = 1 + max((place for motion in motions for place in motion.coordinates), default=-1)
+    if len(coordinates) != needed:
+        raise ModelError(f"{kind} '{path}' has {len(coordinates)} coordinates and needs {needed}")
+    return motions, coordinates
+
+
+def unknown_joint(path: str, kind: str) -> UnsupportedError:
+    """The error for a joint that cannot be computed."""
+    return UnsupportedError(
+        f"'{path}' is a {kind}, whose motion osimlite cannot compute; the joints it can are "
+        f"{listed(JOINT_TYPES, most=len(JOINT_TYPES))}"
+    )
+
+
+def _custom(
+    joint: schema.CustomJoint, path: str, opensim_derivatives: bool
+) -> tuple[tuple[Motion, ...], Sequence[Coordinate]]:
+    known = {coordinate.name: coordinate for coordinate in joint.coordinates}
+    order: dict[str, int] = {}
+    axes: list[TransformAxis] = []
+    for name, axis in joint.spatial_transform.axes().items():
+        where, words = f"{name} of '{path}'", axis.names
+        for word in words:
+            if word not in known:
+                raise ModelError(f"{where} names the coordinate '{word}', which the joint does not have; add it there")
+            # OpenSim sorts the coordinates by their first appearance here, whatever their order in the file.
+            order.setdefault(word, len(order))
+        direction = np.array(axis.axis, dtype=float)
+        if not np.isfinite(direction).all() or not direction.any():
+            raise ModelError(f"the axis of {where} has no direction; give one that is not zero")
+        function = numeric(
+            axis.function, len(words), f"the function of {where}", opensim_derivatives=opensim_derivatives
+        )
+        axes.append(TransformAxis(tuple(order[word] for word in words), direction, function))
+    unused = [name for name in known if name not in order]
+    if unused:
+        raise ModelError(
+            f"CustomJoint '{path}' has {len(known)} coordinates and needs {len(order)}: "
+            f"nothing in its SpatialTransform depends on {listed(unused)}"
+        )
+    motions = custom(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
+    return motions, [known[name] for name in order]
+
+
+def _radii(radii: Sequence[float], path: str) -> Sequence[float]:
+    # Models mirror an ellipsoid by negative radii: the point is then on the other side.
+    if not np.isfinite(radii).all():
+        words = " ".join(f"{radius:g}" for radius in radii)
+        raise ModelError(f"the radii of the ellipsoid of '{path}' are {words}; give three lengths in m")
+    return radii

@@ -1,0 +1,115 @@
+"""Rotations and rigid transforms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from osimlite.mechanics.laws.rotations import about_axis, body_fixed, transposed
+
+Array = NDArray[np.float64]
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross product of two 3-vectors (numpy's general one takes ten times as long)."""
+    ax, ay, az = a.tolist()
+    bx, by, bz = b.tolist()
+    return np.array((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))
+
+
+def skew(v: Array) -> Array:
+    """The matrix [v] with [v] a = v × a."""
+    x, y, z = v.tolist()
+    return np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+
+
+def skews(vectors: Array) -> Array:
+    """The matrices [v] with [v] a = v × a of many vectors: (b, 3) to (b, 3, 3)."""
+    result = np.zeros((len(vectors), 3, 3))
+    for row, column, place, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):
+        result[:, row, column] = sign * vectors[:, place]
+        result[:, column, row] = -sign * vectors[:, place]
+    return result
+
+
+def rotation_about(axis: Array, angle: float) -> Array:
+    """Rotation matrix (3, 3) by `angle` (rad) about the unit vector `axis` (Rodrigues' formula)."""
+    return np.array(transposed(about_axis(axis.tolist(), float(np.sin(angle)), float(np.cos(angle)))))
+
+
+def rotation_xyz(angles: Array) -> Array:
+    """Rotation matrix Rx(a) Ry(b) Rz(c) of body-fixed X-Y-Z `angles` (rad)."""
+    return np.array(transposed(body_fixed(*np.stack((np.sin(angles), np.cos(angles)), axis=1).ravel().tolist())))
+
+
+def rotation_about_space(angles: ArrayLike) -> Array:
+    """Rotation matrix Rz(c) Ry(b) Rx(a) of `angles` (3,) about X, Y and Z of space, one after the other (rad)."""
+    return rotation_xyz(-np.asarray(angles, dtype=float)).T
+
+
+def angles_xyz(rotation: Array) -> Array:
+    """Body-fixed X-Y-Z angles (..., 3) of rotation matrices (..., 3, 3), the second from -90 to 90 degrees (rad)."""
+    r13 = rotation[..., 0, 2]
+    first = np.arctan2(-rotation[..., 1, 2], rotation[..., 2, 2])
+    third = np.arctan2(-rotation[..., 0, 1], rotation[..., 0, 0])
+    # Where only the sum (or difference) of the other two shows, let the third be zero.
+    is_straight = np.abs(r13) > 1.0 - 1e-14
+    alone = np.arctan2(rotation[..., 1, 0], rotation[..., 1, 1]) * np.copysign(1.0, r13)
+    second = np.arcsin(np.clip(r13, -1.0, 1.0))
+    return np.stack([np.where(is_straight, alone, first), second, np.where(is_straight, 0.0, third)], axis=-1)
+
+
+def quaternion(rotation: ArrayLike) -> Array:
+    """Unit quaternions (..., 4), scalar first, of rotation matrices (..., 3, 3), each by the largest of its parts."""
+    m = np.asarray(rotation)
+    trace = np.trace(m, axis1=-2, axis2=-1)[..., None, None]
+    # Every row is the quaternion times one of its parts; the longest has the most digits.
+    products = np.empty((*m.shape[:-2], 4, 4))
+    products[..., 1:, 1:] = m + np.swapaxes(m, -1, -2) + (1.0 - trace) * np.eye(3)
+    for k in range(3):
+        products[..., k + 1, 0] = products[..., 0, k + 1] = m[..., k - 1, k - 2] - m[..., k - 2, k - 1]
+    products[..., :1, :1] = 1.0 + trace
+    largest = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)
+    rows: Array = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
+    rows /= np.linalg.norm(rows, axis=-1, keepdims=True)
+    return rows
+
+
+def rotation_of(quaternions: ArrayLike) -> Array:
+    """Rotation matrices (..., 3, 3) of quaternions (..., 4), scalar first, whatever their lengths; NaN for zeros."""
+    given = np.asarray(quaternions, dtype=float)
+    with np.errstate(invalid="ignore"):
+        # The square of a long or short one is no number.
+        near = given / np.abs(given).max(axis=-1, keepdims=True)
+        w, x, y, z = np.moveaxis(near / np.linalg.norm(near, axis=-1, keepdims=True), -1, 0)
+    return np.stack(
+        (
+            np.stack((w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)), -1),
+            np.stack((2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)), -1),
+            np.stack((2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z), -1),
+        ),
+        -2,
+    )
+
+
+def transform(rotation: Any = None, translation: Any = None) -> Array:
+    """Homogeneous matrix (4, 4) of a rotation matrix and a translation (m); identity for what is left out."""
+    matrix = np.eye(4)
+    if rotation is not None:
+        matrix[:3, :3] = rotation
+    if translation is not None:
+        matrix[:3, 3] = translation
+    return matrix
+
+
+def offset(translation: Any, orientation: Any) -> Array:
+    """Homogeneous matrix of a frame at `translation` (m), turned by body-fixed X-Y-Z `orientation` (rad)."""
+    return transform(rotation_xyz(np.asarray(orientation, dtype=float)), translation)
+
+
+def inverse(matrix: Array) -> Array:
+    """Inverse of a homogeneous matrix."""
+    rotation = matrix[:3, :3].T
+    return transform(rotation, -rotation @ matrix[:3, 3])

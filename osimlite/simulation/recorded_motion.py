@@ -1,0 +1,326 @@
+"""Motions that were recorded: coordinate values from a file, what follows for bodies and markers, and inverse dynamics.
+
+The quantities, their names and their order are those of OpenSim's BodyKinematics analysis and InverseDynamicsTool.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from osimlite.base.records import dataclass, replace
+from osimlite.base.text import counted, did_you_mean, listed
+from osimlite.errors import DocumentError, ModelError, SettingError
+from osimlite.io.tables.storage import StoTable, expect_numbers, read_sto
+from osimlite.mechanics.multibody.dynamics import MassCentres
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
+from osimlite.mechanics.multibody.spatial import Array, angles_xyz
+from osimlite.schema.forces import Force
+from osimlite.schema.model import Model
+from osimlite.schema.tree import is_a
+from osimlite.simulation.elements import Forces
+from osimlite.simulation.lowpass import lowpassed
+from osimlite.simulation.movement import Movement
+from osimlite.simulation.start import columns_of_states
+from osimlite.simulation.system import System
+
+if TYPE_CHECKING:
+    from osimlite.simulation.trajectory import Trajectory
+
+LARGEST = 1e25
+"""No coordinate (rad or m) is larger: what follows of such numbers is none."""
+ALIKE = 1e-6
+"""Values (rad or m) at one time that differ by less are the same."""
+_HALF_ORDER = 3
+"""OpenSim differentiates coordinates by splines of fifth degree."""
+
+KINDS = {"all": "Force", "actuators": "Actuator", "muscles": "Muscle"}
+"""What a list of forces can name besides forces and their groups, in any case, with the classes."""
+
+
+def exclude_forces(model: Model, names: Iterable[str]) -> None:
+    """Switch forces of a model off, as OpenSim's tools do with `forces_to_exclude`; as `excluded_forces`."""
+    for force in excluded_forces(model, names):
+        force.appliesForce = False
+
+
+def excluded_forces(model: Model, names: Iterable[str]) -> list[Force]:
+    """The forces that OpenSim's tools switch off by `forces_to_exclude`.
+
+    Args:
+        model: whose forces.
+        names: of forces or of groups of them; "All", "Actuators" or "Muscles".
+
+    Raises:
+        SettingError: there is no such force, nor such a group.
+    """
+    forces = {force.name: force for force in model.components(Force)}
+    groups = {group.name: group.members for group in model.force_set.groups}
+    result: list[Force] = []
+    for name in names:
+        kind = KINDS.get(name.lower())
+        members = [force for force in forces.values() if is_a(force, kind)] if kind else []
+        if not kind:
+            if name not in groups and name not in forces:
+                near = did_you_mean(name, [*forces, *groups])
+                raise SettingError(f"'{model.name}' has no force and no group of forces '{name}'{near}")
+            named = [str(getattr(member, "name", member)) for member in groups.get(name, (name,))]
+            members = [forces[member] for member in named if member in forces]
+        result += members
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedMotion(Movement):
+    """Values of all coordinates of a mechanism at t times.
+
+    As a table it is these values; :meth:`bodies`, :meth:`markers` and :meth:`inverse_dynamics` are others.
+
+    Attributes:
+        mechanism: whose coordinates they are.
+        times: (t,), s.
+        values: (t, n) in the order of the mechanism's coordinates, rad and m.
+        missing: coordinates that the record does not have; they keep their default values.
+        ignored: columns of the record that name no coordinate.
+        named_by_path: coordinates whose columns have no plain names, but paths as in files of states.
+        around: times (s,) and values (s, n) that are differentiated, where these go on beyond `times`.
+    """
+
+    mechanism: Mechanism
+    times: Array
+    values: Array
+    missing: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+    around: tuple[Array, Array] | None = None
+    named_by_path: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, source: Recorded, times: ArrayLike | None = None) -> RecordedMotion:
+        """A motion from a file, from arrays, or one that was found, which may be of another model.
+
+        Args:
+            mechanism: that follows it.
+            source: a .mot or .sto file; a motion, such as a fitted one or a trajectory; or arrays (t,) in rad and m by
+                the names or paths of coordinates.
+            times: of arrays (t,), s.
+
+        Raises:
+            SettingError: the arrays are not as many numbers as there are times, or these are not given.
+            OsimliteError: it is no motion; as of `read`.
+        """
+        if isinstance(source, str | Path):
+            return cls.read(mechanism, source)
+        if isinstance(source, Mapping):
+            if times is None:
+                raise SettingError("arrays of coordinates have no times of their own; give times")
+            moments = np.asarray(times, dtype=float).reshape(-1)
+            columns = [np.asarray(column, dtype=float) for column in source.values()]
+            for name, column in zip(source, columns, strict=True):
+                if column.shape != moments.shape:
+                    had = " × ".join(map(str, column.shape)) or "one"
+                    raise SettingError(f"'{name}' has {had} values for {counted(len(moments), 'time')}; give one each")
+            rows = np.column_stack([np.empty((len(moments), 0)), *columns])
+            return cls.of_table(mechanism, StoTable("arrays", moments, tuple(source), rows))
+        result = source.mechanism.coordinates
+        return cls.of_table(
+            mechanism, StoTable("motion", source.times, tuple(info.path for info in result), source.values)
+        )
+
+    @classmethod
+    def read(cls, mechanism: Mechanism, path: str | Path) -> RecordedMotion:
+        """The motion in a .mot or .sto file.
+
+        A column is named as the coordinate, or as its value in a file of states of any age (``/jointset/knee/
+        knee_angle/value``, ``knee/knee_angle/value``). If the file is in degrees, rotational coordinates are
+        converted, coupled ones are not, as in OpenSim.
+
+        Raises:
+            DocumentError: it is not a storage file, has no rows, its times do not increase, a coordinate is no number,
+                or no column names one of the mechanism.
+            ModelError: the mechanism has no coordinates.
+        """
+        return cls.of_table(mechanism, read_sto(path))
+
+    @classmethod
+    def of_table(cls, mechanism: Mechanism, table: StoTable) -> RecordedMotion:
+        """The motion in a table; as of :meth:`read`."""
+        if not len(table.times):
+            raise DocumentError("the motion has no rows", file=table.file)
+        values = np.tile(mechanism.values({}), (len(table.times), 1))
+        places = {label: place for place, label in reversed([*enumerate(table.columns)])}
+        states = columns_of_states(
+            table.columns, [f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")]
+        )
+        result: dict[int, int] = {}
+        for place, info in enumerate(mechanism.coordinates):
+            columns = (places.get(info.name), places.get(info.path), states.get(f"{info.path}/value"))
+            column = next((one for one in columns if one is not None and one not in result.values()), None)
+            if column is not None:
+                result[place] = column
+                turned = table.in_degrees and info.motion_type == "rotational"
+                values[:, place] = np.radians(table.rows[:, column]) if turned else table.rows[:, column]
+        # Speeds in a file of states follow from the values, and states of forces are no part of a pose.
+        used = {*result.values(), *states.values()}
+        ignored = [
+            label
+            for place, label in enumerate(table.columns)
+            if place not in used and not label.startswith("/forceset/")
+        ]
+        if not mechanism.coordinates:
+            raise ModelError(f"'{mechanism.name}' has no coordinates: it cannot follow a motion", file=table.file)
+        if not result:
+            raise DocumentError(
+                f"no column is a coordinate of '{mechanism.name}'; its coordinates are "
+                f"{listed(mechanism.coordinate_names)}",
+                file=table.file,
+            )
+        close = (np.abs(np.diff(values, axis=0)) < ALIKE).all(axis=1)
+        if len(again := np.flatnonzero((np.diff(table.times) == 0.0) & close)):
+            # OpenSim's tools end a motion with two rows that are at one time once they are printed.
+            table = replace(table, times=np.delete(table.times, again), rows=np.delete(table.rows, again, axis=0))
+            values = np.delete(values, again, axis=0)
+        late = np.flatnonzero(np.diff(table.times) <= 0.0)
+        if len(late):
+            raise DocumentError(
+                f"the time {table.times[late[0] + 1]:g} does not come after {table.times[late[0]]:g}; sort the rows",
+                file=table.file,
+            )
+        gaps = np.argwhere(~(np.abs(values) < LARGEST))
+        if len(gaps):
+            row, place = gaps[0]
+            name = mechanism.coordinates[place].name
+            told = f"'{name}' is {values[row, place]} at {table.times[row]:g} s; "
+            told += "fill the gaps" if not np.isfinite(values[row, place]) else "no body goes so far"
+            raise DocumentError(told, file=table.file)
+        missing = tuple(info.name for place, info in enumerate(mechanism.coordinates) if place not in result)
+        plain = {*table.columns}
+        by_path = tuple(mechanism.coordinates[place].name for place in sorted(result))
+        by_path = tuple(name for name in by_path if name not in plain)
+        return cls(mechanism, table.times, values, missing, tuple(ignored), named_by_path=by_path)
+
+    @cached_property
+    def rates(self) -> tuple[Array, Array]:
+        """First and second derivatives (t, n) of the values, by natural splines of fifth degree through them.
+
+        Raises:
+            SettingError: there are fewer than six times.
+        """
+        self._require_times("accelerations need")
+        first, second = derivatives_of_samples(
+            *(self.around or (self.times, self.values)), self.times, (1, 2), _HALF_ORDER
+        )
+        return first, second
+
+    def lowpassed(self, cutoff: float, *, continued: bool = False) -> RecordedMotion:
+        """The motion through OpenSim's low-pass filter of `cutoff` Hz, at even times.
+
+        Args:
+            cutoff: frequency, Hz.
+            continued: whether what the filter adds at both ends, half the length of the motion each, is part of it, and
+                a frequency that is too high gives way, as in OpenSim's tools.
+
+        Raises:
+            SettingError: the frequency is not positive, or too high for the times, or there are fewer than six.
+        """
+        self._require_times("a filter needs")
+        times, values = lowpassed(self.times, self.values, cutoff, limited=continued)
+        if continued:
+            return replace(self, times=times, values=values, around=None)
+        # What the filter adds at the ends nobody has recorded.
+        slack = 1e-6 * (times[1] - times[0])
+        own = (times >= self.times[0] - slack) & (times <= self.times[-1] + slack)
+        return replace(self, times=times[own], values=values[own], around=(times, values))
+
+    def between(self, first: float, last: float) -> RecordedMotion:
+        """The motion from the time (s) at or before `first` to that at or before `last`, of which it has one at least.
+
+        Raises:
+            SettingError: `last` is before `first`.
+        """
+        if not first <= last:
+            raise SettingError(f"the times from {first:g} s to {last:g} s are none; give the first time first")
+        start, end = (max(0, int(np.searchsorted(self.times, time, side="right")) - 1) for time in (first, last))
+        around = self.around or (self.times, self.values)
+        return replace(self, times=self.times[start : end + 1], values=self.values[start : end + 1], around=around)
+
+    def _require_times(self, what: str) -> None:
+        count = len(self.around[0] if self.around else self.times)
+        if count < 2 * _HALF_ORDER:
+            raise SettingError(f"the motion has {counted(count, 'time')}; {what} at least {2 * _HALF_ORDER}")
+
+    def assembled(self) -> RecordedMotion:
+        """The motion with every pose changed as little as the constraints demand.
+
+        Raises:
+            SimulationError: a pose is too far from fulfilling them.
+        """
+        from osimlite.simulation.pose_assembly import assemble_motion
+
+        poses = assemble_motion(self.mechanism, self.times, self.values)
+        return RecordedMotion(self.mechanism, self.times, poses, self.missing, self.ignored)
+
+    def bodies(self) -> StoTable:
+        """Mass centre of each body (m) and its body-fixed X-Y-Z angles (degrees) in ground, then the mass centre."""
+        mechanism = self.mechanism
+        columns = [f"{body.name}_{what}" for body in mechanism.bodies for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")]
+        rows = np.empty((len(self.times), len(columns) + 3))
+        for row, q in zip(rows, self.values, strict=True):
+            state = mechanism.at(q)
+            angles = np.degrees(angles_xyz(state.rotations[:-1]))
+            centres = MassCentres.of(state).positions()
+            row[:-3] = np.concatenate([centres, angles], axis=1).ravel()
+            row[-3:] = mechanism.inertial[0] @ centres / (mechanism.total_mass or 1.0)
+        labels = (*columns, *(f"center_of_mass_{axis}" for axis in "XYZ"))
+        return StoTable("Positions", self.times, labels, rows, in_degrees=True)
+
+    def markers(self) -> StoTable:
+        """Position (m) in ground of every marker."""
+        mechanism = self.mechanism
+        places = {path: place for path, place in mechanism.stations.items() if path.startswith("/markerset/")}
+        columns = [f"{path.rsplit('/', 1)[1]}_{axis}" for path in places for axis in "XYZ"]
+        rows = np.empty((len(self.times), len(columns)))
+        for row, q in zip(rows, self.values, strict=True):
+            state = mechanism.at(q)
+            row[:] = [number for place in places.values() for number in state.point(*place)]
+        return StoTable("MarkerPositions", self.times, tuple(columns), rows)
+
+    def inverse_dynamics(self, forces: Forces | None = None) -> StoTable:
+        """Generalized forces (N, N·m) that make the bodies move so, beyond gravity and what else pushes them.
+
+        Locks and other constraints are left aside, as in OpenSim. The forces belong to the generalized speeds: for
+        ball and free joints a moment about an axis of the joint's parent frame. There OpenSim's tool takes the
+        rates of the angles for the speeds, which is wrong unless the angles are small.
+
+        Args:
+            forces: of the mechanism: springs, contacts, measured loads; their own states are where they start.
+
+        Raises:
+            SimulationError: a force cannot be computed at one of the states, or a result is NaN or infinite.
+        """
+        mechanism = self.mechanism
+        system = System(mechanism.released(), forces or Forces(()))
+        order = list(system.order)
+        speeds, accelerations = (rates.copy() for rates in self.rates)
+        if mechanism.turning:
+            for q, u, udot in zip(self.values, speeds, accelerations, strict=True):
+                u[:] = mechanism.speeds_from_rates(q, u)
+                udot[:] = mechanism.speeds_from_rates(q, udot - mechanism.rate_bias(q, u))
+        states = system.state.rows(self.values, speeds)
+        rows = np.empty_like(self.values)
+        rows[:, order] = system.missing(np.column_stack([self.times, states]), accelerations[:, order])
+        order = [place for body in mechanism.bodies for place in body.mobilizer.coordinates]
+        infos = [mechanism.coordinates[place] for place in order]
+        labels = [f"{info.name}_{'moment' if info.motion_type == 'rotational' else 'force'}" for info in infos]
+        name = "Inverse Dynamics Generalized Forces"
+        expect_numbers(name, labels, self.times, rows[:, order])
+        return StoTable(name, self.times, tuple(labels), rows[:, order])
+
+
+Recorded: TypeAlias = "str | Path | Mapping[str, ArrayLike] | Movement | Trajectory"
+"""A motion in any form."""

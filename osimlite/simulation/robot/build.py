@@ -1,0 +1,212 @@
+"""From the mechanism to the neutral robot: each joint is spread out into motions along or about one axis."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+
+from osimlite.base.records import replace
+from osimlite.base.text import unused
+from osimlite.mechanics.multibody.functions import IDENTITY, Constant, Function, Linear, Scaled
+from osimlite.mechanics.multibody.joints import Mobilizer
+from osimlite.mechanics.multibody.mechanism import Mechanism, Values
+from osimlite.mechanics.multibody.motions import AxisMotion, Fixed
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.simulation.robot.lines import as_line
+from osimlite.simulation.robot.robot import WORLD, Link, Robot, RobotJoint
+from osimlite.simulation.robot.shapes import Visual
+
+_ALONG = 1e-14
+"""How far off an axis, relative to its own length, a vector may be and still count as lying along it."""
+
+
+def build_robot(
+    mechanism: Mechanism,
+    *,
+    locked: Literal["fixed", "joint"] | Collection[int] = "fixed",
+    body_frames: bool = True,
+    at: Values | None = None,
+    visuals: Mapping[str, Sequence[Visual]] | None = None,
+    collisions: Mapping[str, Sequence[Visual]] | None = None,
+) -> Robot:
+    """Spread a mechanism out into one-axis joints.
+
+    Args:
+        mechanism: what to spread out.
+        locked: whether a locked coordinate becomes a fixed joint or stays a joint that moves; or which coordinates
+            become fixed joints, by their places in the mechanism.
+        body_frames: give every body a link whose frame is the body's own. Where the body's frame is off the axis of
+            its joint, that takes a massless link at the axis and a fixed joint; without it the body's link has its
+            frame at the joint, which saves a link, and `Link.bodies` tells where the body is.
+        at: coordinate values at which locked coordinates are fixed; their defaults if left out.
+        visuals: shapes by absolute path of the body (or ``"/ground"``), placed in the body's frame.
+        collisions: what bodies touch others with, likewise.
+    """
+    values = mechanism.values({} if at is None else at)
+    if isinstance(locked, str):
+        locked = [k for k, info in enumerate(mechanism.coordinates) if info.locked and locked == "fixed"]
+    return _Builder(mechanism, locked, body_frames, values).robot(visuals or {}, collisions or {})
+
+
+class _Builder:
+    def __init__(self, mechanism: Mechanism, still: Collection[int], body_frames: bool, values: Array) -> None:
+        self.mechanism = mechanism
+        self.body_frames = body_frames
+        self.values = values
+        self.still = frozenset(still)
+        # Bodies and coordinates have the first call on their own names; what has to be invented steps aside.
+        self.taken = {WORLD}
+        self.body_names = [self._unique(body.name) for body in mechanism.bodies]
+        self.coordinate_names = [
+            None if k in self.still else self._unique(info.name) for k, info in enumerate(mechanism.coordinates)
+        ]
+        self.links: list[Link] = []
+        self.joints: list[RobotJoint] = []
+
+    def robot(self, visuals: Mapping[str, Sequence[Visual]], collisions: Mapping[str, Sequence[Visual]]) -> Robot:
+        ground = "/ground"
+        self.links.append(
+            Link(
+                WORLD,
+                visuals=tuple(visuals.get(ground, ())),
+                collisions=tuple(collisions.get(ground, ())),
+                bodies={ground: np.eye(4)},
+            )
+        )
+        # Link and frame in it, of ground (-1) and every body so far.
+        placed: dict[int, tuple[str, Array]] = {-1: (WORLD, np.eye(4))}
+        for index, body in enumerate(self.mechanism.bodies):
+            name, frame = self._body(index, *placed[body.parent])
+            placed[index] = name, frame
+            self.links[-1] = replace(
+                self.links[-1],
+                visuals=_placed(visuals.get(body.path, ()), frame),
+                collisions=_placed(collisions.get(body.path, ()), frame),
+            )
+        return Robot(self.mechanism.name, tuple(self.links), tuple(self.joints), self.mechanism)
+
+    def _body(self, index: int, parent: str, start: Array) -> tuple[str, Array]:
+        """Add the joints and links up to a body, its own link last; returns its name and the body's frame in it."""
+        body = self.mechanism.bodies[index]
+        mobilizer = body.mobilizer
+        motions, frames = self._split(mobilizer, start)
+        name = self.body_names[index]
+        if motions and self.body_frames:
+            _carry_back(motions, frames)
+        last = frames.pop()
+        off_axis = bool(motions) and self.body_frames and not np.array_equal(last, np.eye(4))
+        for place, (motion, origin) in enumerate(zip(motions, frames, strict=True)):
+            carries_body = place == len(motions) - 1 and not off_axis
+            joint = self._joint(motion, mobilizer, origin, parent, "" if carries_body else None, name)
+            if not carries_body:
+                self.links.append(Link(joint.child))
+            self.joints.append(joint)
+            parent = joint.child
+        if not motions or off_axis:
+            suffix = "_frame" if off_axis else ""
+            joint_name = self._unique(mobilizer.joint.rsplit("/", 1)[1] + suffix)
+            self.joints.append(RobotJoint(joint_name, "fixed", parent, name, last, source=mobilizer.joint))
+            last = np.eye(4)
+        properties = body.mass_properties
+        self.links.append(
+            Link(
+                name,
+                properties.mass,
+                last[:3, :3] @ properties.center + last[:3, 3],
+                last[:3, :3] @ properties.inertia @ last[:3, :3].T,
+                bodies={body.path: last},
+            )
+        )
+        return name, last
+
+    def _joint(
+        self, motion: AxisMotion, mobilizer: Mobilizer, origin: Array, parent: str, child: str | None, body_name: str
+    ) -> RobotJoint:
+        places = tuple(mobilizer.coordinates[place] for place in motion.coordinates)
+        name = self.coordinate_names[places[0]] if motion.coordinate is not None else None
+        if name is not None:
+            # A second joint driven by the same coordinate needs a name of its own.
+            self.coordinate_names[places[0]] = None
+        else:
+            name = self._unique(f"{self.mechanism.coordinates[places[0]].name}_{_letter(motion)}")
+        return RobotJoint(
+            name=name,
+            kind="revolute" if motion.kind == "rotate" else "prismatic",
+            parent=parent,
+            child=body_name if child is not None else self._unique(f"{body_name}_{name}"),
+            origin=origin,
+            axis=motion.axis,
+            coordinates=places,
+            function=motion.function,
+            source=mobilizer.joint,
+        )
+
+    def _split(self, mobilizer: Mobilizer, start: Array) -> tuple[list[AxisMotion], list[Array]]:
+        """The m motions on the way to the body, and the m + 1 fixed transforms before, between and after them."""
+        own = list(mobilizer.coordinates)
+        motions: list[AxisMotion] = []
+        frames = [start]
+        for part in mobilizer.elementary():
+            for factor in self._simplified(part, own):
+                if isinstance(factor, Fixed):
+                    frames[-1] = frames[-1] @ factor.matrix
+                else:
+                    motions.append(factor)
+                    frames.append(np.eye(4))
+        return motions, frames
+
+    def _simplified(self, part: Fixed | AxisMotion, own: Sequence[int]) -> Iterator[Fixed | AxisMotion]:
+        """The same motion with what is constant in it taken out."""
+        if isinstance(part, Fixed):
+            yield part
+        elif _is_constant(part.function) or all(own[place] in self.still for place in part.coordinates):
+            yield Fixed(part.placed(self.values[own]))
+        elif part.function == IDENTITY or (line := as_line(part.function)) is None:
+            yield part
+        else:
+            slope = line.slope
+            first = AxisMotion(part.kind, part.axis, (0,), Constant(line.start))
+            yield Fixed(first.placed(np.zeros(1)))
+            unit = abs(slope) == 1.0
+            yield AxisMotion(
+                part.kind,
+                part.axis * slope if unit else part.axis,
+                part.coordinates,
+                IDENTITY if unit else Linear(slope),
+            )
+
+    def _unique(self, name: str) -> str:
+        unique = unused(name, self.taken)
+        self.taken.add(unique)
+        return unique
+
+
+def _carry_back(motions: list[AxisMotion], frames: list[Array]) -> None:
+    """Move the last fixed transform in front of the last motion if that leaves the product unchanged.
+
+    A translation lets any transform pass, a rotation one that does not leave its axis; the axis turns with it.
+    """
+    motion, last = motions[-1], frames[-1]
+    turn, shift = last[:3, :3], last[:3, 3]
+    along = np.linalg.norm(np.cross(motion.axis, shift)) <= _ALONG * float(np.linalg.norm(shift))
+    if motion.kind == "translate" or along:
+        motions[-1] = replace(motion, axis=turn.T @ motion.axis)
+        frames[-2:] = [frames[-2] @ last, np.eye(4)]
+
+
+def _placed(shapes: Sequence[Visual], frame: Array) -> tuple[Visual, ...]:
+    return tuple(replace(shape, origin=frame @ shape.origin) for shape in shapes)
+
+
+def _is_constant(function: Function) -> bool:
+    if isinstance(function, Scaled):
+        return function.scale == 0.0 or _is_constant(function.function)
+    line = as_line(function)
+    return isinstance(function, Constant) or (line is not None and line.slope == 0.0)
+
+
+def _letter(motion: AxisMotion) -> str:
+    """Name for a joint that is not its coordinate: the axis it is nearest to, ``rx`` or ``tz``."""
+    return ("r" if motion.kind == "rotate" else "t") + "xyz"[int(np.argmax(np.abs(motion.axis)))]

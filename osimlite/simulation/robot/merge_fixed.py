@@ -1,0 +1,70 @@
+"""Bodies that do not move relative to each other, made one link."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from osimlite.base.records import replace
+from osimlite.mechanics.multibody.spatial import Array, skew
+from osimlite.simulation.robot.robot import Link, Robot
+
+
+def merge_fixed(robot: Robot) -> Robot:
+    """The same robot without fixed joints: what a fixed joint carries becomes part of the link that carries it.
+
+    A massless link that stands between two joints takes the name of the body it gets. What is fixed to ground
+    becomes part of the root link; its mass is left out, since the root does not move.
+    """
+    links = {link.name: link for link in robot.links}
+    # For every link, the link it became part of and its frame there.
+    home: dict[str, tuple[str, Array]] = {robot.links[0].name: (robot.links[0].name, np.eye(4))}
+    joints, names = [], {name: name for name in links}
+    for joint in robot.joints:
+        base, start = home[joint.parent]
+        if joint.kind != "fixed":
+            joints.append(replace(joint, parent=base, origin=start @ joint.origin))
+            home[joint.child] = (joint.child, np.eye(4))
+            continue
+        placed = start @ joint.origin
+        home[joint.child] = (base, placed)
+        own, root = links[base], base == robot.links[0].name
+        if not own.bodies:
+            names[base] = joint.child
+        links[base] = _with(own, links[joint.child], placed, massless=root)
+    kept = [link.name for link in robot.links if home[link.name][0] == link.name]
+    return replace(
+        robot,
+        links=tuple(replace(links[name], name=names[name]) for name in kept),
+        joints=tuple(replace(joint, parent=names[joint.parent], child=names[joint.child]) for joint in joints),
+    )
+
+
+def _with(link: Link, other: Link, placed: Array, *, massless: bool) -> Link:
+    """`link` with `other` welded to it, whose frame is `placed` (4, 4) in its own."""
+    turn, shift = placed[:3, :3], placed[:3, 3]
+    visuals, collisions = (
+        tuple(replace(shape, origin=placed @ shape.origin) for shape in shapes)
+        for shapes in (other.visuals, other.collisions)
+    )
+    bodies = {path: placed @ frame for path, frame in other.bodies.items()}
+    merged = replace(
+        link,
+        visuals=link.visuals + visuals,
+        collisions=link.collisions + collisions,
+        bodies={**link.bodies, **bodies},
+    )
+    if massless:
+        return merged
+    mass = link.mass + other.mass
+    center = turn @ other.center + shift
+    middle = (link.mass * link.center + other.mass * center) / mass if mass > 0.0 else np.zeros(3)
+    inertia = _about(link.inertia, link.mass, link.center - middle) + _about(
+        turn @ other.inertia @ turn.T, other.mass, center - middle
+    )
+    return replace(merged, mass=mass, center=middle, inertia=inertia)
+
+
+def _about(inertia: Array, mass: float, arm: Array) -> Array:
+    """Inertia about a point from which the mass centre is `arm` away (parallel axes)."""
+    cross = skew(arm)
+    return inertia - mass * cross @ cross

@@ -1,0 +1,198 @@
+"""URDF text of a neutral robot.
+
+What is written so that readers take the same mechanics from it:
+
+- Links and joints one to one, so a reader's joints are `Robot.joints` by name (readers number them in orders of
+  their own) and its links `Robot.links`. The root link "world" is massless and fixed.
+- Every link has its ``<inertial>``: the origin stands at the mass centre and its axes are the principal axes, so the
+  tensor is diagonal. A link that only stands between two joints says mass 0 and inertia 0; left out, some readers
+  take 1 kg.
+- A rotation without hard limits is a ``continuous`` joint. A ``prismatic`` joint must have limits: `UNLIMITED` where
+  the model has none. OpenSim's coordinate ranges limit no motion, so they are no limits here unless the robot says so.
+- A joint driven by a multiple of the coordinate of another joint says so with ``<mimic>``; any other function cannot
+  be said.
+- MuJoCo refuses a body without mass that moves. A ``<mujoco>`` element, which other readers skip, tells it to give
+  such bodies `LEAST_MASS`, and to look for mesh files where the text says they are.
+- PyBullet tells the frames of links in single precision and their inertial frames (mass centre, principal axes) in
+  double: who needs more than 1e-7 has to start from the latter and take out the ``<inertial>`` origin.
+- No ``<collision>``: contact in OpenSim is a force between a few named surfaces, not a property of shapes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import pairwise
+
+from osimlite.io.document.escape import quoted
+from osimlite.io.document.lexical import shortest
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.simulation.robot.mimics import Mimic, mimics
+from osimlite.simulation.robot.names import UniqueNames
+from osimlite.simulation.robot.principal_axes import principal_axes
+from osimlite.simulation.robot.robot import Link, Robot, RobotJoint
+from osimlite.simulation.robot.shapes import Ball, Box, MeshFile, Tube, Visual
+
+UNLIMITED = 1e9
+"""Limit of position, velocity or effort (m, m/s, rad/s, N, N·m) where the model has none."""
+
+LEAST_MASS = 1e-9
+"""Mass (kg) and principal moments (kg·m²) of a massless link in MuJoCo; all else reads zero."""
+
+LONGEST_LINE = 1000
+"""Characters; Bullet breaks a line of more than 8191 in the middle of whatever is there."""
+
+Attributes = dict[str, str]
+
+
+def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
+    """Write a robot as URDF.
+
+    Args:
+        robot: with legal names (see `osimlite.simulation.robot.names`).
+        visuals: whether to say what links look like.
+    """
+    out, unique = _Writer(), UniqueNames()
+    with_visuals = [visual for link in robot.links for visual in link.visuals] if visuals else []
+    materials = {color: _material_name(color) for color in sorted({visual.color for visual in with_visuals})}
+    out.line('<?xml version="1.0" encoding="utf-8"?>')
+    with out.element("robot", {"name": robot.name}):
+        with out.element("mujoco"):
+            least = number(LEAST_MASS)
+            out.empty("compiler", {"boundmass": least, "boundinertia": least, "strippath": "false"})
+        for color, name in materials.items():
+            with out.element("material", {"name": name}):
+                out.empty("color", {"rgba": numbers(color)})
+        for link in robot.links:
+            with out.element("link", {"name": link.name}):
+                _write_inertial(out, link)
+                for visual in link.visuals if visuals else ():
+                    with out.element("visual"):
+                        _write_shape(out, visual)
+                        out.empty("material", {"name": materials[visual.color]})
+                for collision in link.collisions:
+                    with out.element("collision", {"name": unique(collision.source.rsplit("/", 1)[-1])}):
+                        _write_shape(out, collision)
+        following = mimics(robot)
+        for joint in robot.joints:
+            _write_joint(out, joint, following.get(joint.name))
+    return out.text()
+
+
+def number(value: float) -> str:
+    """The shortest text that reads back as the same float."""
+    # Not -0 either.
+    return shortest(float(value) + 0.0)
+
+
+def numbers(values: Sequence[float] | Array) -> str:
+    """Numbers separated by blanks."""
+    return " ".join(number(float(value)) for value in values)
+
+
+def roll_pitch_yaw(rotation: Array) -> tuple[float, float, float]:
+    """Angles (rad) with Rz(yaw) Ry(pitch) Rx(roll) = rotation, exact to rounding for any rotation.
+
+    Yaw comes first and is taken out before the others are computed; at a pitch of ±90 degrees, where roll and yaw do
+    the same, that still gives a pair that fits.
+    """
+    r = rotation.tolist()
+    yaw = math.atan2(r[1][0], r[0][0])
+    s, c = math.sin(yaw), math.cos(yaw)
+    pitch = math.atan2(-r[2][0], c * r[0][0] + s * r[1][0])
+    roll = math.atan2(s * r[0][2] - c * r[1][2], c * r[1][1] - s * r[0][1])
+    return roll, pitch, yaw
+
+
+def _write_inertial(out: _Writer, link: Link) -> None:
+    moments, axes = principal_axes(link.inertia)
+    ixx, iyy, izz = (number(moment) for moment in moments)
+    with out.element("inertial"):
+        out.empty("origin", {"xyz": numbers(link.center), "rpy": numbers(roll_pitch_yaw(axes))})
+        out.empty("mass", {"value": number(link.mass)})
+        out.empty("inertia", {"ixx": ixx, "ixy": "0", "ixz": "0", "iyy": iyy, "iyz": "0", "izz": izz})
+
+
+def _write_shape(out: _Writer, shape: Visual) -> None:
+    _write_origin(out, shape.origin)
+    with out.element("geometry"):
+        match shape.shape:
+            case Box(size):
+                out.empty("box", {"size": numbers(size)})
+            case Ball(radius):
+                out.empty("sphere", {"radius": number(radius)})
+            case Tube(radius, length):
+                out.empty("cylinder", {"radius": number(radius), "length": number(length)})
+            case MeshFile(file, scale):
+                out.empty("mesh", {"filename": file, "scale": numbers(scale)})
+
+
+def _write_joint(out: _Writer, joint: RobotJoint, mimic: Mimic | None) -> None:
+    kind = "continuous" if joint.kind == "revolute" and joint.limits is None else joint.kind
+    with out.element("joint", {"name": joint.name, "type": kind}):
+        out.empty("parent", {"link": joint.parent})
+        out.empty("child", {"link": joint.child})
+        _write_origin(out, joint.origin)
+        if joint.kind == "fixed":
+            return
+        out.empty("axis", {"xyz": numbers(joint.axis)})
+        strength = {
+            "effort": number(UNLIMITED if joint.effort is None else joint.effort),
+            "velocity": number(UNLIMITED if joint.velocity is None else joint.velocity),
+        }
+        if kind == "continuous":
+            out.empty("limit", strength)
+        else:
+            lower, upper = (-UNLIMITED, UNLIMITED) if joint.limits is None else joint.limits
+            out.empty("limit", {"lower": number(lower), "upper": number(upper), **strength})
+        if mimic is not None:
+            offset = {"offset": number(mimic.line.start)} if mimic.line.start else {}
+            out.empty("mimic", {"joint": mimic.leader, "multiplier": number(mimic.line.slope), **offset})
+
+
+def _write_origin(out: _Writer, matrix: Array) -> None:
+    out.empty("origin", {"xyz": numbers(matrix[:3, 3]), "rpy": numbers(roll_pitch_yaw(matrix[:3, :3]))})
+
+
+def _material_name(color: tuple[float, float, float, float]) -> str:
+    return "rgba_" + "_".join(number(part).replace(".", "p").replace("-", "m") for part in color)
+
+
+class _Writer:
+    """Indented XML, one element a line."""
+
+    def __init__(self) -> None:
+        self._lines: list[str] = []
+        self._depth = 0
+
+    def line(self, text: str) -> None:
+        self._lines.append("  " * self._depth + text)
+
+    def empty(self, tag: str, attributes: Attributes) -> None:
+        self._start(tag, attributes, "/>")
+
+    @contextmanager
+    def element(self, tag: str, attributes: Attributes | None = None) -> Iterator[None]:
+        self._start(tag, attributes or {}, ">")
+        self._depth += 1
+        yield
+        self._depth -= 1
+        self.line(f"</{tag}>")
+
+    def text(self) -> str:
+        return "\n".join(self._lines) + "\n"
+
+    def _start(self, tag: str, attributes: Attributes, end: str) -> None:
+        for line in _wrapped([f"<{tag}", *(f"{name}={quoted(value)}" for name, value in attributes.items())], end):
+            self.line(line)
+
+
+def _wrapped(words: Sequence[str], end: str) -> Iterator[str]:
+    """The words of a start tag on one line, or one a line if that gets too long."""
+    whole = " ".join(words) + end
+    if len(whole) <= LONGEST_LINE:
+        yield whole
+        return
+    for word, following in pairwise([*words, ""]):
+        yield word if following else word + end

@@ -1,0 +1,208 @@
+"""What bodies look like, taken from the geometry attached to the frames of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import copysign
+from typing import Protocol
+
+import numpy as np
+
+from osimlite.base.records import dataclass, field
+from osimlite.io.meshes.unit_shapes import ball, tube
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array, rotation_about, transform
+from osimlite.schema.frames import Frame
+from osimlite.schema.geometry import (
+    Brick,
+    Cylinder,
+    Ellipsoid,
+    FrameGeometry,
+    Geometry,
+    Mesh,
+    Sphere,
+)
+from osimlite.schema.model import Model
+from osimlite.schema.tree import Tree
+from osimlite.simulation.robot.mesh_files import MeshFiles, MeshProblem
+from osimlite.simulation.robot.shapes import Ball, Box, MeshFile, Shape, Tube, Visual
+
+_Y_TO_Z = transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
+"""The frame, in OpenSim's cylinder frame, in which the cylinder lies along Z."""
+_Y_TO_Z[np.abs(_Y_TO_Z) < 1e-15] = 0.0
+
+GREATEST = 3e38
+"""Of sizes (m): programs draw in numbers of single precision."""
+
+
+class Note(Protocol):
+    """Is told what a shape cannot say; `osimlite.translate.fidelity.Fidelity.add` is one."""
+
+    def __call__(self, kind: str, component: str, cannot_say: str, done: str, detail: str = "") -> None:
+        """Take note of it; the arguments are those of a record of the translation."""
+
+
+def _unheard(kind: str, component: str, cannot_say: str, done: str, detail: str = "") -> None:
+    """Let nobody know."""
+
+
+@dataclass
+class Visuals:
+    """Shapes by absolute path of the body (or ``"/ground"``), and the mesh files they need, by relative name."""
+
+    by_body: dict[str, list[Visual]] = field(default_factory=dict)
+    files: dict[str, bytes] = field(default_factory=dict)
+
+
+def collect_visuals(
+    model: Model,
+    mechanism: Mechanism,
+    note: Note = _unheard,
+    mesh_files: MeshFiles | None = None,
+) -> Visuals:
+    """Gather the shapes of a model, each placed in the frame of the body that carries it.
+
+    Args:
+        model: where the geometry is.
+        mechanism: of the same model; knows where frames are.
+        note: is told of what cannot be drawn.
+        mesh_files: takes the mesh files up, and knows the folders; without it there are none.
+    """
+    return _Collector(model, mechanism, note, mesh_files or MeshFiles()).collect()
+
+
+class _Collector:
+    def __init__(self, model: Model, mechanism: Mechanism, note: Note, mesh_files: MeshFiles) -> None:
+        self.tree = model.tree()
+        self.mechanism = mechanism
+        self.note = note
+        self.mesh_files = mesh_files
+        self.found = Visuals(files=mesh_files.files)
+
+    def collect(self) -> Visuals:
+        for component in self.tree.components:
+            if isinstance(component, Geometry) and not isinstance(component, FrameGeometry):
+                self._add(component, self.tree.path_of(component) or component.name)
+        return self.found
+
+    def _add(self, geometry: Geometry, path: str) -> None:
+        note = self.note
+        frame = frame_of(self.tree, geometry)
+        if frame is None or frame not in self.mechanism.frames:
+            note("visual", path, "a shape in a frame that is not fixed to a body", "left out")
+            return
+        appearance = geometry.appearance
+        if not appearance.visible:
+            note("hidden-visual", path, "a shape that is there but not shown", "left out")
+            return
+        made = self._shape(geometry, path)
+        if made is None:
+            return
+        shape, placed = made
+        surface = appearance.surface_properties
+        if surface.representation != 3 or surface.texture:
+            note("appearance", path, "a shape drawn as points or lines, or with a texture", "filled, in its colour")
+        body, where = self.mechanism.frames[frame]
+        owner = "/ground" if body < 0 else self.mechanism.bodies[body].path
+        red, green, blue, opacity = (min(max(part, 0.0), 1.0) for part in (*appearance.color, appearance.opacity))
+        visual = Visual(shape, where @ placed, (red, green, blue, opacity), path)
+        self.found.by_body.setdefault(owner, []).append(visual)
+
+    def _shape(self, geometry: Geometry, path: str) -> tuple[Shape, Array] | None:
+        """The shape, and its frame in the frame of the geometry."""
+        note, here = self.note, np.eye(4)
+        scale = tuple(abs(factor) for factor in geometry.scale_factors)
+        match geometry:
+            case Brick():
+                x, y, z = sizes = tuple(2.0 * half * by for half, by in zip(geometry.half_lengths, scale, strict=True))
+                return (Box((x, y, z)), here) if self._drawn(path, sizes) else None
+            case Sphere() | Ellipsoid():
+                own = (geometry.radius,) * 3 if isinstance(geometry, Sphere) else geometry.radii
+                a, b, c = sizes = tuple(radius * factor for radius, factor in zip(own, scale, strict=True))
+                if not self._drawn(path, sizes):
+                    return None
+                if a == b == c:
+                    return Ball(a), here
+                file = self.mesh_files.stretched("ellipsoid", ball(), (a, b, c))
+                note("ellipsoid", path, "an ellipsoid", "written as a mesh file", f"{file}, half axes {sizes} m")
+                return MeshFile(file), here
+            case Cylinder():
+                # OpenSim's X, Y, Z are the X, Z, -Y of a frame in which the cylinder lies along Z.
+                a, b, length = sizes = (
+                    geometry.radius * scale[0],
+                    geometry.radius * scale[2],
+                    2 * geometry.half_height * scale[1],
+                )
+                if not self._drawn(path, sizes):
+                    return None
+                if a == b:
+                    return Tube(a, length), _Y_TO_Z
+                file = self.mesh_files.stretched("elliptic_cylinder", tube(), (a, b, length))
+                note("elliptic-cylinder", path, "a cylinder that is not round", "written as a mesh file", file)
+                return MeshFile(file), _Y_TO_Z
+            case Mesh():
+                return self._mesh(geometry, path)
+        note("visual", path, f"a shape of class {type(geometry).__name__}", "left out")
+        return None
+
+    def _drawn(self, path: str, sizes: Sequence[float]) -> bool:
+        """Whether programs can draw a shape of these sizes; otherwise that is noted."""
+        if all(0.0 < size < GREATEST for size in sizes):
+            return True
+        given = " ".join(f"{size:g}" for size in sizes)
+        self.note("visual", path, "a shape whose size is no positive number", "left out", f"{given} m")
+        return False
+
+    def _mesh(self, geometry: Mesh, path: str) -> tuple[Shape, Array] | None:
+        shape = mesh_shape(geometry.mesh_file, path, self.mesh_files, self.note, geometry.scale_factors)
+        return None if shape is None else (shape, np.eye(4))
+
+
+def frame_of(tree: Tree, geometry: Geometry) -> str | None:
+    """Path of the frame a shape is in: the one its socket names, else the component above that is a frame.
+
+    Raises:
+        ModelError: the socket leads nowhere.
+    """
+    socket = geometry.socket_frame
+    if socket and not (isinstance(socket, str) and socket.strip() == ".."):
+        return tree.path_of(tree.target(geometry, "socket_frame", socket))
+    above = tree.parent_of(geometry)
+    return tree.path_of(above) if isinstance(above, Frame) else None
+
+
+def mesh_shape(
+    name: str,
+    path: str,
+    mesh_files: MeshFiles,
+    note: Note,
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
+) -> MeshFile | None:
+    """A mesh file of the model as a shape; None, and a record that tells why, if nothing can be made of it.
+
+    Args:
+        name: of the file, as in the model.
+        path: absolute path of the component that names it.
+        mesh_files: finds the file and takes it up.
+        note: is told what became of the file.
+        scale: factors, of which negative ones mirror the surface.
+    """
+    signs = (copysign(1.0, scale[0]), copysign(1.0, scale[1]), copysign(1.0, scale[2]))
+    try:
+        copy = mesh_files.copy(name, signs)
+    except MeshProblem as problem:
+        note("mesh", path, "a mesh whose file cannot be taken", str(problem), name)
+        return None
+    if copy.converted:
+        form = "VTK's format" if copy.source.suffix.lower() == ".vtp" else "a form that not every program reads"
+        note("mesh-format", path, f"a mesh in {form}", copy.converted, f"{name} as {copy.file}")
+    if copy.misspelt:
+        note(
+            "mesh-name",
+            path,
+            "a file name in other capitals than the file's",
+            "the file taken",
+            f"{name} as {copy.source.name}",
+        )
+    x, y, z = (abs(factor) for factor in scale)
+    return MeshFile(copy.file, (x, y, z))

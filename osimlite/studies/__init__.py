@@ -1,0 +1,1 @@
+"""Many simulations of one model: parameter sweeps, gaits, reflexes, and environments for learning."""

@@ -1,0 +1,55 @@
+"""A picture of a basin of attraction."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.studies.gait.basin import Basin
+from osimlite.view.lettering import plain_lettering
+from osimlite.view.plots import figure_of, save
+
+
+def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the fall") -> Path:
+    """Draw from which starts a walker walks.
+
+    Args:
+        basin: how many steps it makes from a grid of starts.
+        path: of the PNG file.
+        title: of the picture.
+
+    Raises:
+        MissingDependency: matplotlib is not installed.
+        OsimliteError: the file cannot be written.
+    """
+    with plain_lettering():
+        return _draw(basin, Path(path), title)
+
+
+def _draw(basin: Basin, path: Path, title: str) -> Path:
+    figure = figure_of("", (6.4, 5.2))
+    axes = figure.subplots()
+    half = [float(axis.values[1] - axis.values[0]) / 2.0 for axis in (basin.x, basin.y)]
+    x, y = basin.x.values, basin.y.values
+    extent = (x[0] - half[0], x[-1] + half[0], y[0] - half[1], y[-1] + half[1])
+    image = axes.imshow(
+        basin.steps, origin="lower", extent=extent, aspect="auto", cmap="viridis", vmin=0, vmax=basin.wanted
+    )
+    axes.plot(*basin.center, marker="o", mfc="#d55e00", mec="white", ms=8)
+    axes.annotate(
+        "cycle",
+        basin.center,
+        (8, 6),
+        textcoords="offset points",
+        color="black",
+        fontsize=10,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.5},
+    )
+    axes.set_xlabel(basin.x.label)
+    axes.set_ylabel(basin.y.label)
+    axes.set_title(f"{title}: {100.0 * basin.part:.0f} % of {basin.steps.size} starts walk", loc="left", fontsize=11)
+    bar = figure.colorbar(image, ax=axes)
+    bar.set_label(f"steps, {basin.wanted} or more count as walking")
+    bar.set_ticks(np.linspace(0, basin.wanted, 5).round().astype(int))
+    return save(figure, path, dpi=110)

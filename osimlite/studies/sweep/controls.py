@@ -1,0 +1,267 @@
+"""What a sweep varies of controls, and the controllers that do so.
+
+=============================  ===========================================================================
+``soleus_r/control``           a number that is added at all times
+``soleus_r/control@0.1``       a node: what is added at a time (s); all nodes of an actuator are joined
+``soleus_r/control@0:0.5:6``   six nodes from 0 to 0.5 s; ``@0,0.1,0.3`` are nodes at these times
+``soleus_r/control@switch1``   a time (s) from which 1 is added until the next one, ``@switch2``, and so on
+``soleus_r/control@scale``     factor of what the PrescribedControllers of the model make it
+=============================  ===========================================================================
+
+All of it becomes functions of PrescribedControllers, so that the model that is written does the same in OpenSim.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from itertools import count
+from typing import Any
+
+import numpy as np
+
+from osimlite.base.records import dataclass
+from osimlite.base.text import did_you_mean, or_known
+from osimlite.errors import SettingError
+from osimlite.schema.actuators import Actuator
+from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.controllers import Controller
+from osimlite.schema.functions import (
+    Constant,
+    Function,
+    GCVSpline,
+    MultiplierFunction,
+    PiecewiseConstantFunction,
+    PiecewiseLinearFunction,
+)
+from osimlite.schema.model import Model
+
+OFFSET, NODE, SWITCH, SCALE = "offset", "node", "switch", "scale"
+
+INTERPOLATIONS = ("linear", "steps", "cubic")
+"""What may be between nodes. Before the first and after the last one, lines and steps hold their values."""
+
+FEWEST_OF_CUBIC = 4
+
+BEFORE = -1.0
+"""A time before any run, s."""
+
+Values = Sequence[float]
+
+
+@dataclass(frozen=True)
+class Control:
+    """A number that several controls depend on."""
+
+    actuators: tuple[str, ...]  # paths of those that are controlled
+    kind: str = OFFSET  # `OFFSET`, `NODE`, `SWITCH` or `SCALE`
+    at: float = 0.0  # time of a node (s), or number of a switch
+
+    @property
+    def parts(self) -> tuple[Control, ...]:
+        """The same of each actuator."""
+        return tuple(Control((path,), self.kind, self.at) for path in self.actuators)
+
+    @property
+    def unit(self) -> str:
+        """Of the number."""
+        return "s" if self.kind == SWITCH else ""
+
+    @property
+    def present(self) -> float | None:
+        """The number with which nothing changes, if a search should begin there."""
+        return {OFFSET: 0.0, SCALE: 1.0}.get(self.kind)
+
+
+def control(name: str, actuators: Sequence[str], word: str) -> Control:
+    """What is meant by the word behind the ``@`` in the name of a variable; empty without one.
+
+    Raises:
+        SettingError: it is no such word.
+    """
+    kind, at = OFFSET, 0.0
+    if word == SCALE:
+        kind = SCALE
+    elif number := re.fullmatch(rf"{SWITCH}(\d+)", word):
+        kind, at = SWITCH, float(number[1])
+    elif word:
+        kind, at = NODE, _time(name, word)
+    return Control(tuple(actuators), kind, at)
+
+
+def nodes_of(name: str) -> list[str]:
+    """Names of the nodes that one name means: ``a@0:0.4:3`` is ``a@0``, ``a@0.2`` and ``a@0.4``.
+
+    Raises:
+        SettingError: the times are not written so.
+    """
+    front, at, word = name.partition("@")
+    if at and not word:
+        _time(name, word)
+    if ":" in word:
+        first, _, rest = word.partition(":")
+        last, _, number = rest.partition(":")
+        if not number.isdigit() or int(number) < 2:
+            raise SettingError(f"nodes are given as @FIRST:LAST:COUNT, with a count of two or more; got '{name}'")
+        times = np.linspace(_time(name, first), _time(name, last), int(number)).tolist()
+    elif "," in word:
+        times = [_time(name, part) for part in word.split(",")]
+    else:
+        return [name]
+    return [f"{front}@{time:.12g}" for time in times]
+
+
+def _time(name: str, word: str) -> float:
+    try:
+        time = float(word)
+    except ValueError:
+        time = -1.0
+    if not 0.0 <= time < np.inf:
+        raise SettingError(
+            f"behind the @ of '{name}' is a time in s, 'switch1', 'switch2' ... or 'scale', not '{word}'"
+        )
+    return time
+
+
+def check_nodes(controls: Mapping[int, Control], interpolation: str, to: float) -> None:
+    """Stop at nodes through which there is no curve.
+
+    Args:
+        controls: that are varied, by the places of their variables.
+        interpolation: one of `INTERPOLATIONS`.
+        to: how long the runs last, s.
+
+    Raises:
+        SettingError: there is no such interpolation, or a cubic has too few nodes, or goes on beyond them.
+    """
+    if interpolation not in INTERPOLATIONS:
+        raise SettingError(f"there is no interpolation '{interpolation}'{or_known(interpolation, INTERPOLATIONS)}")
+    if interpolation != "cubic":
+        return
+    for actuator, parts in _by_actuator(controls, NODE).items():
+        times = [time for time, _ in parts]
+        if len(times) < FEWEST_OF_CUBIC or times[0] > 0.0 or times[-1] < to * (1.0 - 1e-9):
+            raise SettingError(
+                f"a cubic needs {FEWEST_OF_CUBIC} nodes or more, the first at 0 and the last at the end of the runs, "
+                f"{to:g} s; those of '{actuator}' are at {', '.join(f'{time:g}' for time in times)} s"
+            )
+
+
+def controller_of(model: Model, controls: Mapping[str, Any]) -> PrescribedController:
+    """The controller that makes given controls; outside of the times of a table its first and last values hold.
+
+    Args:
+        model: whose actuators they are.
+        controls: by the name or path of an actuator a number, or ``(times, values)``.
+
+    Raises:
+        SettingError: there is no such actuator, or a control is something else.
+    """
+    actuators = {key: item.path for item in model.components(Actuator) for key in (item.name, item.path)}
+    made = _controller(model, "given", [actuators.get(key, key) for key in controls])
+    for name, given in controls.items():
+        if name not in actuators:
+            raise SettingError(f"the model has no actuator '{name}' to control{did_you_mean(name, actuators)}")
+        if isinstance(given, tuple):
+            times, values = (np.asarray(numbers, dtype=float).tolist() for numbers in given)
+            y = (values[0], *values, values[-1])
+            made.ControlFunctions.objects.append(PiecewiseLinearFunction(x=_around(times), y=y))
+        elif isinstance(given, int | float):
+            made.ControlFunctions.objects.append(Constant(value=float(given)))
+        else:
+            raise SettingError(f"the control of '{name}' is {given!r}; a sweep takes numbers and tables")
+    return made
+
+
+def _controller(model: Model, kind: str, actuators: Sequence[str]) -> PrescribedController:
+    """One without functions, and with a name of its own: a model that a search has written has others of the kind."""
+    taken = {item.name for item in model.components(Controller)}
+    name = next(name for number in count(1) if (name := f"{kind}_{number}") not in taken)
+    return PrescribedController(name=name, socket_actuators=tuple(actuators))
+
+
+def _around(times: Values) -> tuple[float, ...]:
+    """Times with one more at either end, so that the outer values hold."""
+    return (min(BEFORE, times[0] - 1.0), *times, times[-1] + 1.0)
+
+
+class VariedControls:
+    """The controllers that make of a model what is varied of its controls.
+
+    Args:
+        model: to which they are added.
+        controls: that are varied, by the places of their variables.
+        interpolation: of nodes.
+
+    Attributes:
+        controllers: those that the variables have a part in.
+
+    Raises:
+        SettingError: nothing in the model makes a control that is to be scaled.
+    """
+
+    def __init__(self, model: Model, controls: Mapping[int, Control], interpolation: str) -> None:
+        self.controllers: list[Controller] = []
+        self._puts: list[tuple[Function, str, Callable[[Values], Any]]] = []
+        for actuator, ((_, place),) in _by_actuator(controls, SCALE).items():
+            self._scale(model, actuator, place)
+        for kind in (OFFSET, NODE, SWITCH):
+            if parts := _by_actuator(controls, kind):
+                made = _controller(model, kind, list(parts))
+                made.ControlFunctions.objects += [self._function(kind, own, interpolation) for own in parts.values()]
+                self.controllers.append(model.add(made))
+
+    def put(self, values: Values) -> None:
+        """Set the controls to what the values of all variables make them."""
+        for function, name, made in self._puts:
+            setattr(function, name, made(values))
+
+    def _function(self, kind: str, parts: Sequence[tuple[float, int]], interpolation: str) -> Function:
+        times, places = zip(*parts, strict=True)
+        function: Function
+        if kind == OFFSET:
+            function = Constant()
+            self._puts.append((function, "value", lambda values: values[places[0]]))
+        elif kind == SWITCH:
+            # Switches may pass each other: what counts is when something is switched.
+            x, y = (BEFORE, *(0.0 for _ in places)), (float(k % 2) for k in range(len(places) + 1))
+            function = PiecewiseConstantFunction(x=x, y=tuple(y))
+            self._puts.append((function, "x", lambda values: (BEFORE, *sorted(values[k] for k in places))))
+        else:
+            if interpolation == "cubic":
+                function = GCVSpline(half_order=2, x=times, weights=(1.0,) * len(times))
+            else:
+                made = PiecewiseLinearFunction if interpolation == "linear" else PiecewiseConstantFunction
+                function, places = made(x=_around(times)), (places[0], *places, places[-1])
+            function.y = (0.0,) * len(places)
+            self._puts.append((function, "y", lambda values: tuple(values[k] for k in places)))
+        return function
+
+    def _scale(self, model: Model, actuator: str, place: int) -> None:
+        """Put the functions of a control into others that multiply them."""
+        before = len(self._puts)
+        for controller in model.components(PrescribedController):
+            functions = controller.ControlFunctions.objects
+            targets = [
+                model.tree().target(controller, "socket_actuators", word) for word in controller.socket_actuators
+            ]
+            for number, (target, own) in enumerate(zip(targets, functions, strict=False)):
+                if target is not None and target.path == actuator:
+                    functions[number] = multiplier = MultiplierFunction(name=own.name, function=own)
+                    self._puts.append((multiplier, "scale", lambda values: values[place]))
+                    self.controllers.append(controller)
+        if len(self._puts) == before:
+            raise SettingError(
+                f"no function of a PrescribedController makes the control of '{actuator}', so that there is nothing to "
+                "scale; give one with --controls"
+            )
+
+
+def _by_actuator(controls: Mapping[int, Control], kind: str) -> dict[str, list[tuple[float, int]]]:
+    """For each actuator that has parts of a kind, when or which they are, in order, and places of the variables."""
+    result: dict[str, list[tuple[float, int]]] = {}
+    for place, part in controls.items():
+        if part.kind == kind:
+            for actuator in part.actuators:
+                result.setdefault(actuator, []).append((part.at, place))
+    return {actuator: sorted(parts) for actuator, parts in result.items()}

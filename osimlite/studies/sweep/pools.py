@@ -1,0 +1,77 @@
+"""Pools of workers that run the samples of a sweep: threads, processes, or a Dask cluster, with the same results."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
+from functools import partial
+
+from osimlite.base.pools import LocalPool, Pool, count_workers, processes
+from osimlite.studies.sweep.plan import Plan
+from osimlite.studies.sweep.runner import Block, Runner
+from osimlite.studies.sweep.variables import Floats
+
+
+@contextmanager
+def pool(plan: Plan, *, workers: int | None = None, cluster: str | None = None) -> Iterator[Pool]:
+    """Make a pool for a plan; without a cluster, on this machine.
+
+    Args:
+        plan: what is run.
+        workers: threads or processes here; by default one for each core.
+        cluster: address of a Dask scheduler, such as ``tcp://127.0.0.1:8786``.
+
+    Raises:
+        SettingError: the settings do not go together.
+        OsimliteError: the cluster cannot be reached.
+        MissingDependency: dask.distributed is not installed.
+    """
+    if cluster is None and plan.engine == "compiled":
+        with closing(ThreadPool(plan, count_workers(workers))) as threads:
+            yield threads
+        return
+    # What tells of a plan that cannot be run does so here.
+    Runner(plan)
+    with processes(partial(run_packed, plan.packed()), workers=workers, cluster=cluster) as made:
+        yield made
+
+
+class ThreadPool(LocalPool):
+    """Threads: the compiled engine lets them run side by side."""
+
+    def __init__(self, plan: Plan, count: int) -> None:
+        # What tells of a plan that cannot be run serves the first thread.
+        spare = [Runner(plan)]
+
+        def begin() -> None:
+            try:
+                _local.runner = spare.pop()
+            except IndexError:
+                _local.runner = Runner(plan)
+
+        executor = ThreadPoolExecutor(count, initializer=begin)
+        super().__init__(executor, lambda values: _thread_runner(plan).run(values), count)
+
+
+_local = threading.local()
+
+
+def _thread_runner(plan: Plan) -> Runner:
+    """The runner of this thread."""
+    kept: Runner | None = getattr(_local, "runner", None)
+    if kept is None or kept.plan is not plan:
+        kept = _local.runner = Runner(plan)
+    return kept
+
+
+def run_packed(packed: bytes, values: Floats) -> Block:
+    """Run samples of a packed plan.
+
+    Raises:
+        OsimliteError: a sample cannot be run.
+    """
+    if getattr(_local, "packed", None) != packed:
+        _local.packed, _local.plan = packed, Plan.unpacked(packed)
+    return _thread_runner(_local.plan).run(values)

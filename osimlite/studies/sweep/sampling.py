@@ -1,0 +1,175 @@
+"""Where the runs of a sweep are: grids and samples of the unit cube, any part of which can be had without the rest.
+
+Row i depends on the settings and on i alone. A sweep of any length needs memory for one block only, and can go on
+where it was interrupted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import prod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from osimlite.base.records import dataclass, field
+from osimlite.base.require import require
+from osimlite.base.text import listed, or_known
+from osimlite.errors import SettingError
+from osimlite.studies.sweep.variables import Floats, Variable
+
+Counts = NDArray[np.uint64]
+
+SAMPLERS = ("grid", "random", "sobol", "lhs")
+"""Every combination; independent; Sobol's sequence, scrambled; one in every layer of each variable (Latin)."""
+
+MOST_SOBOL = 2**30
+"""So many points scipy's sequence has."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The runs of a sweep."""
+
+    variables: tuple[Variable, ...]  # d numbers that vary
+    sampler: str  # one of `SAMPLERS`
+    count: int  # N runs
+    seed: int = 0  # what makes random samples the same again
+    # of the last block, from which the next one goes on; for one thread at a time
+    memory: dict[str, Sobol] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def block(self, first: int, count: int) -> Floats:
+        """Rows from `first` on, as many as `count` and as there are (k, d), in the units of the variables."""
+        last = min(first + count, self.count)
+        fractions = np.zeros((max(last - first, 0), len(self.variables)))
+        varied = [index for index, item in enumerate(self.variables) if not item.is_fixed]
+        if len(fractions) and varied:
+            fractions[:, varied] = self._fractions(first, last, varied)
+        columns = [item.at(fractions[:, index]) for index, item in enumerate(self.variables)]
+        return np.stack(columns, axis=1) if columns else fractions
+
+    def _fractions(self, first: int, last: int, varied: Sequence[int]) -> Floats:
+        if self.sampler == "grid":
+            return self._grid(first, last, varied)
+        if self.sampler == "sobol":
+            return self.memory.setdefault("sobol", Sobol(self.seed, len(varied))).points(first, last)
+        numbers = _uniform(self.seed, first, last, len(varied))
+        if self.sampler == "random":
+            return numbers
+        layers = [_shuffled(first, last, self.count, self.seed, column) for column in range(len(varied))]
+        return (np.stack(layers, axis=1) + numbers) / self.count
+
+    def _grid(self, first: int, last: int, varied: Sequence[int]) -> Floats:
+        """The last variable changes fastest."""
+        counts = [self.variables[place].count or 1 for place in varied]
+        places = np.unravel_index(np.arange(first, last), counts)
+        return np.stack([place / (count - 1) for place, count in zip(places, counts, strict=True)], axis=1)
+
+
+def samples(
+    variables: Sequence[Variable], sampler: str | None = None, count: int | None = None, seed: int = 0
+) -> Samples:
+    """Choose the runs.
+
+    Args:
+        variables: what varies.
+        sampler: by default a grid if every variable has a number of values and no `count` is given, else Sobol's.
+        count: how many runs; of a grid, as many as it has.
+        seed: of random samples.
+
+    Raises:
+        SettingError: what is asked for does not go together.
+    """
+    varied = [item for item in variables if not item.is_fixed]
+    with_values = [item.name for item in varied if item.count]
+    if sampler is None and count is not None and with_values:
+        raise SettingError(
+            f"--samples says how many runs are drawn, the COUNT in the range of {listed(with_values)} how many values "
+            "a grid has; leave out one of the two, or name the --sampler"
+        )
+    if sampler is None:
+        sampler = "grid" if count is None and all(item.count for item in varied) else "sobol"
+    if sampler not in SAMPLERS:
+        raise SettingError(f"there is no sampler '{sampler}'{or_known(sampler, SAMPLERS)}")
+    if seed < 0:
+        raise SettingError(f"the seed is a whole number from 0 on, not {seed}")
+    if sampler == "grid":
+        bare = [item.name for item in varied if item.count is None]
+        if bare:
+            raise SettingError(f"a grid needs the number of values of {listed(bare)}, as in {bare[0]}=LOW:HIGH:COUNT")
+        whole = prod(item.count or 1 for item in varied)
+        if count not in (None, whole):
+            raise SettingError(f"the grid has {whole} points, not {count}; leave out the number of samples")
+        return Samples(tuple(variables), sampler, whole, seed)
+    if count is None:
+        raise SettingError("say how many samples are wanted, as in --samples 1000")
+    if count < 1:
+        raise SettingError(f"the number of samples is above zero, not {count}")
+    if sampler == "sobol" and count > MOST_SOBOL:
+        raise SettingError(f"Sobol's sequence has {MOST_SOBOL} points; take --sampler random for more")
+    return Samples(tuple(variables), sampler, count, seed)
+
+
+class Sobol:
+    """Sobol's sequence in the cube of so many dimensions, scrambled by a seed.
+
+    Points that follow on the last ones cost little; for others, the sequence is begun again.
+    """
+
+    def __init__(self, seed: int, width: int) -> None:
+        self._seed, self._width = seed, width
+        self._points: Any = None
+        self._next = 0
+
+    def points(self, first: int, last: int) -> Floats:
+        """Points first ... last - 1."""
+        head = np.zeros((0, self._width))
+        if self._points is None or first < self._next:
+            qmc: Any = require("scipy.stats.qmc", extra="sweep", purpose="Sobol's sequence")
+            self._points = qmc.Sobol(self._width, scramble=True, rng=np.random.default_rng(self._seed))
+            # Asked for more than one at first, scipy warns of numbers that are no power of two.
+            start, self._next = self._points.random(1), 1
+            head = start if first == 0 else head
+        first = max(first, 1) if len(head) else first
+        if first > self._next:
+            self._points.fast_forward(first - self._next)
+        result: Floats = np.concatenate((head, self._points.random(last - first)))
+        self._next = last
+        return result
+
+
+def _uniform(seed: int, first: int, last: int, width: int) -> Floats:
+    """Rows first ... last - 1 of independent numbers in [0, 1)."""
+    # Each state of this generator makes four numbers, so that a row begins at a state of its own.
+    states = -(-width // 4)
+    source = np.random.Philox(seed)
+    source.advance(first * states)
+    rows = np.random.Generator(source).random((last - first, 4 * states))
+    return rows[:, :width]
+
+
+def _shuffled(first: int, last: int, count: int, seed: int, column: int) -> Floats:
+    """Entries first ... last - 1 of a random order of 0 ... count - 1, the rest of which is never made.
+
+    A Feistel network permutes the numbers of 2k bits; those beyond `count` go through it again until they are below.
+    """
+    half = max(1, -(-(count - 1).bit_length() // 2))
+    mask = np.uint64((1 << half) - 1)
+    keys = np.random.default_rng((seed, column)).integers(0, 2**64, 6, dtype=np.uint64)
+    result: Counts = np.arange(first, last, dtype=np.uint64)
+    beyond = np.ones(len(result), dtype=bool)
+    while beyond.any():
+        left, right = result[beyond] >> np.uint64(half), result[beyond] & mask
+        for key in keys:
+            left, right = right, left ^ (_mixed(right + key) & mask)
+        result[beyond] = (left << np.uint64(half)) | right
+        beyond = result >= count
+    return result.astype(np.float64)
+
+
+def _mixed(x: Counts) -> Counts:
+    """Every bit of the result depends on every bit of x (the finalizer of SplitMix64)."""
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))

@@ -1,0 +1,423 @@
+"""A report of trials as one page: the motion with its markers, angles, moments, residuals, errors of the fit."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from osimlite.base.files import write_atomically
+from osimlite.base.records import replace
+from osimlite.base.text import listed
+from osimlite.errors import OsimliteError
+from osimlite.fitting.fitted_motion import ADVICE
+from osimlite.io.document.kept import top_at
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.tools.evidence import Evidence, Steps, quietly_steps, root_of, side_of
+from osimlite.tools.outcome import DYNAMICS, Outcome
+from osimlite.tools.trials.check import check_trial
+from osimlite.tools.trials.folder import SETUPS
+from osimlite.view.lettering import plain_lettering
+from osimlite.view.motion import contact_forces
+from osimlite.view.plots import COLORS, STYLES, figure_of
+from osimlite.view.recording import MeasuredMarkers, Recording, computed_forces
+from osimlite.view.shown import Shown
+
+SIDES = {"r": (COLORS[0], "right"), "l": (COLORS[1], "left"), "": ("#444444", "")}
+"""Colour and name of the lines of each side."""
+PERCENT = np.linspace(0.0, 100.0, 101)
+STILL = 1e-4
+"""An angle that changes by less (rad) does not move."""
+WORST = 12
+"""So many markers are shown by name."""
+NOT_PUSHED = "HalfSpace", "ground"
+"""What stands still, of both that a contact pushes."""
+STYLE = """
+body { font: 15px/1.5 system-ui, sans-serif; color: #1d2733; background: #fff; max-width: 1120px; margin: 0 auto;
+  padding: 0 20px 60px }
+h1 { font-size: 26px; margin: 28px 0 4px }
+h2 { font-size: 19px; margin: 34px 0 6px; border-bottom: 1px solid #d7dde5; padding-bottom: 4px }
+p.note { color: #5a6675; margin: 4px 0 10px }
+table { border-collapse: collapse; margin: 8px 0 }
+td, th { padding: 2px 18px 2px 0; text-align: left; vertical-align: top }
+iframe { width: 100%; height: 600px; border: 1px solid #d7dde5; border-radius: 6px }
+td.number, .good, .okay, .bad { white-space: nowrap }
+td { overflow-wrap: anywhere }
+.source { color: #5a6675; font-size: 13px }
+.good { color: #1a7f37 } .okay { color: #9a6700 } .bad { color: #cf222e; font-weight: 600 }
+ul.note { color: #5a6675; margin: 0 0 10px; padding-left: 20px; overflow-wrap: anywhere }
+img { max-width: 100%; height: auto; display: block }
+"""
+
+
+PLAIN = "body{grid-template-columns:1fr!important}aside{display:none!important}"
+"""The page of a motion without its lists at the sides."""
+
+
+class Trial(NamedTuple):
+    """What is shown of a trial."""
+
+    name: str  # what it is called
+    outcomes: Sequence[Outcome]  # of the setups that belong to it
+
+    @property
+    def evidence(self) -> Evidence | None:
+        """That with markers first."""
+        result = [outcome.evidence for outcome in self.outcomes if outcome.evidence is not None]
+        return min(result, key=lambda item: item.measured is None, default=None)
+
+    @property
+    def steps(self) -> dict[str, Steps]:
+        """By the loads of any of its setups."""
+        result = (quietly_steps(outcome.evidence) for outcome in self.outcomes if outcome.evidence is not None)
+        return next((steps for steps in result if steps), {})
+
+
+class _Line(NamedTuple):
+    times: Array
+    column: Array
+    side: str
+    style: str
+    label: str
+    steps: Mapping[str, Steps]
+
+
+def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
+    """Write a report of what runs gave, as one page (HTML) that needs nothing else.
+
+    Setups of one folder are one trial, which has its name (a study of Moco alone has its own); several trials, and the
+    left and right side, are drawn over each other. With measured loads curves go over the gait cycle, from each strike
+    of a foot to its next.
+
+    Args:
+        outcomes: of the runs by their setups.
+        path: the file to write.
+
+    Raises:
+        OsimliteError: none has a motion, or the file cannot be written.
+        MissingDependency: matplotlib is not installed.
+    """
+    trials = collect_trials(outcomes)
+    if all(trial.evidence is None for trial in trials):
+        raise OsimliteError("there is nothing to report: none of the setups has a motion")
+    with plain_lettering():
+        parts = "".join([*_parts(trials), *_verdicts(outcomes)])
+    title = html.escape(listed([trial.name for trial in trials]))
+    page = (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" '
+        f'content="width=device-width, initial-scale=1"><title>{title}</title>'
+        f"<style>{STYLE}</style></head><body><h1>{title}</h1>{parts}</body></html>\n"
+    )
+    write_atomically(path, page)
+    return Path(path)
+
+
+def collect_trials(outcomes: Mapping[str | Path, Outcome]) -> list[Trial]:
+    """Group the outcomes of tools by the folder of their trial."""
+    by_folder: dict[Path, list[Outcome]] = {}
+    for setup, outcome in outcomes.items():
+        by_folder.setdefault(Path(setup).resolve().parent, []).append(outcome)
+    titles = [outcome.title for outcome in outcomes.values()]
+    alone = titles[0] if len(titles) == 1 else ""
+    return [Trial(alone or folder.name, group) for folder, group in by_folder.items()]
+
+
+def _parts(trials: Sequence[Trial]) -> Iterator[str]:
+    for trial in trials:
+        rows = [(name, words) for outcome in trial.outcomes for name, words in outcome.told]
+        facts = "".join(f"<tr><th>{html.escape(name)}</th><td>{html.escape(words)}</td></tr>" for name, words in rows)
+        heading = f"<h2>{html.escape(trial.name)}</h2>" if len(trials) > 1 else ""
+        yield f"{heading}<table>{facts}</table>"
+        if trial.evidence is not None:
+            yield _viewer(trial.evidence)
+    shown = [trial for trial in trials if trial.evidence is not None]
+    yield from _section("Joint angles", collect_angles(shown))
+    yield from _section("Joint moments", collect_moments(shown))
+    yield from _section("Controls", collect_controls(shown))
+    yield from _section("Contact forces", collect_contacts(shown))
+    for trial in shown:
+        name = f": {trial.name}" if len(shown) > 1 else ""
+        yield from _residuals(trial, name)
+        yield from _errors(trial, name)
+
+
+def _verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
+    """What the results are worth by published limits."""
+    written = [file for outcome in outcomes.values() for file in outcome.files]
+    setups = [setup for setup in outcomes if type(top_at(str(setup))).__name__ in SETUPS]
+    try:
+        result = check_trial(*setups, written=written) if setups else None
+    except OsimliteError:
+        return
+    if result is None or not result.verdicts:
+        return
+    rows = "".join(
+        f'<tr><td class="{item.verdict}">{item.verdict}</td><td class="number">{html.escape(item.shown)}</td>'
+        f'<td class="number">{item.limits}</td><td>{html.escape(item.words)} '
+        f'<span class="source">{html.escape(item.source)}</span></td></tr>'
+        for item in result.worst
+    )
+    left = "".join(f"<li>{html.escape(why)}</li>" for why in result.unchecked)
+    left = f'<p class="note">Not looked at:</p><ul class="note">{left}</ul>' if left else ""
+    yield (
+        '<h2>Is it good enough?</h2><p class="note">The worst of each kind: good is within every published limit, okay '
+        "beyond the stricter of two, bad beyond all.</p><table><tr><th></th><th></th><th>limits</th><th></th></tr>"
+        f"{rows}</table>{left}"
+    )
+
+
+def _viewer(evidence: Evidence) -> str:
+    mechanism = build_mechanism(evidence.model)
+    measured = None
+    if evidence.measured is not None:
+        own = {path.rpartition("/")[2]: station for path, station in mechanism.stations.items()}
+        known = [place for place, name in enumerate(evidence.markers) if name in own]
+        names = [evidence.markers[place] for place in known]
+        stations = [(own[name].body, np.asarray(own[name].location)) for name in names]
+        measured = MeasuredMarkers(names, stations, evidence.measured[:, known])
+    motion = _motion(evidence, mechanism, measured)
+    shown = Shown.of(evidence.model, mechanism, file=evidence.file, motion=motion)
+    # Nobody mends the model here.
+    page = replace(shown, findings=()).page_text().replace("</style>", f"{PLAIN}</style>", 1)
+    note = "Green: as measured; pink: of the model." if measured else ""
+    return f'<iframe srcdoc="{html.escape(page)}" title="the motion"></iframe><p class="note">{note}</p>'
+
+
+def _motion(evidence: Evidence, mechanism: Mechanism, measured: MeasuredMarkers | None = None) -> Recording:
+    """With the forces of its contacts, if it has speeds."""
+    speeds, forces = evidence.speeds, dict[str, Array]()
+    if speeds is None:
+        speeds = np.zeros_like(evidence.values)
+    else:
+        folder = evidence.file.parent
+        forces = computed_forces(evidence.model, mechanism, evidence.times, evidence.values, speeds, folder)
+    return Recording(
+        evidence.times, evidence.coordinates, evidence.values, speeds, forces, evidence.states, measured=measured
+    )
+
+
+def collect_angles(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
+    """Lines by coordinate without its side, angles in degrees."""
+    panels: dict[str, list[_Line]] = {}
+    for number, trial in enumerate(trials):
+        evidence = trial.evidence
+        assert evidence is not None
+        for index, name in enumerate(evidence.coordinates):
+            column = evidence.values[:, index]
+            if not evidence.turning[index] or np.ptp(column) < STILL:
+                continue
+            stem, side = side_of(name)
+            panels.setdefault(f"{stem} (deg)", []).append(
+                _Line(evidence.times, np.degrees(column), side, STYLES[number % 3], trial.name, trial.steps)
+            )
+    return panels
+
+
+def collect_moments(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
+    """Lines of generalized forces, those at the root left out."""
+    panels: dict[str, list[_Line]] = {}
+    for number, trial in enumerate(trials):
+        for outcome in trial.outcomes:
+            root = _root(outcome.evidence)
+            for table in _dynamics(outcome):
+                for label in table.columns:
+                    name, _, kind = label.rpartition("_")
+                    if name in root or kind not in ("moment", "force"):
+                        continue
+                    stem, side = side_of(name)
+                    unit = "N m" if kind == "moment" else "N"
+                    line = _Line(table.times, table[label], side, STYLES[number % 3], trial.name, trial.steps)
+                    panels.setdefault(f"{stem} ({unit})", []).append(line)
+    return panels
+
+
+def collect_controls(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
+    """Lines by control without its side."""
+    panels: dict[str, list[_Line]] = {}
+    for number, trial in enumerate(trials):
+        evidence = trial.evidence
+        if evidence is None or evidence.controls is None:
+            continue
+        for label in evidence.controls.columns:
+            stem, side = side_of(label.rpartition("/")[2])
+            column, times = evidence.controls[label], evidence.controls.times
+            known = np.isfinite(column)
+            line = _Line(times[known], column[known], side, STYLES[number % 3], trial.name, {})
+            panels.setdefault(stem, []).append(line)
+    return panels
+
+
+def collect_contacts(trials: Sequence[Trial]) -> dict[str, list[_Line]]:
+    """Lines by axis of what pushes each side."""
+    panels: dict[str, list[_Line]] = {}
+    for number, trial in enumerate(trials):
+        evidence = trial.evidence
+        if evidence is None or evidence.speeds is None:
+            continue
+        sums: dict[str, Array] = {}
+        for force in contact_forces(_motion(evidence, build_mechanism(evidence.model))):
+            if force.frame not in NOT_PUSHED:
+                side = side_of(force.element)[1]
+                sums[side] = sums.get(side, 0.0) + force.vectors
+        for axis, name in enumerate("xyz"):
+            for side, vectors in sums.items():
+                if np.ptp(vectors[:, axis]) > 0.0:
+                    line = _Line(evidence.times, vectors[:, axis], side, STYLES[number % 3], trial.name, {})
+                    panels.setdefault(f"along {name} (N)", []).append(line)
+    return panels
+
+
+def _dynamics(outcome: Outcome) -> list[Any]:
+    return [table for table in outcome.tables.values() if table.name == DYNAMICS]
+
+
+def _root(evidence: Evidence | None) -> set[str]:
+    """The coordinates of the joint between the model and ground."""
+    if evidence is None:
+        return set()
+    mechanism = build_mechanism(evidence.model)
+    return {mechanism.coordinates[place].name for place in root_of(mechanism)}
+
+
+def _section(title: str, panels: Mapping[str, list[_Line]]) -> Iterator[str]:
+    if not panels:
+        return
+    lines = [line for group in panels.values() for line in group]
+    cyclic = all(line.steps.get(side) and line.steps[side].cycles for line in lines for side in (line.side or "r",))
+    columns, rows = 3, -(-len(panels) // 3)
+    figure = figure_of("", (11.0, 0.4 + 2.1 * rows))
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for panel, (label, group) in zip(axes, panels.items(), strict=False):
+        for line in group:
+            _draw(panel, line, cyclic=cyclic)
+        panel.set_title(label.replace("_", " "), fontsize=10, loc="left")
+        _tidy(panel, "gait cycle (%)" if cyclic else "time (s)")
+    for panel in axes[len(panels) :]:
+        panel.set_visible(False)
+    _legend(figure, lines)
+    if cyclic:
+        note = "Over the gait cycle, from each strike of the foot on its side to the next: thin each, thick their mean."
+        if any(not line.side for line in lines):
+            note += " What has no side goes by the right foot."
+    else:
+        note = "Over time"
+        note += "; vertical lines: strikes (solid) and toe-offs (dotted)." if any(line.steps for line in lines) else "."
+    yield f'<h2>{title}</h2><p class="note">{note}</p>{_image(figure)}'
+
+
+def _draw(panel: Any, line: _Line, *, cyclic: bool) -> None:
+    color, _ = SIDES[line.side]
+    if not cyclic:
+        panel.plot(line.times, line.column, color=color, ls=line.style, lw=1.5)
+        for side, steps in line.steps.items():
+            if side == (line.side or side):
+                for ls, moments in (("-", steps.strikes), (":", steps.offs)):
+                    for moment in moments:
+                        if line.times[0] <= moment <= line.times[-1]:
+                            panel.axvline(moment, color=SIDES[side][0], ls=ls, lw=0.6, alpha=0.6)
+        return
+    cycles = [
+        np.interp(first + (last - first) * PERCENT / 100.0, line.times, line.column)
+        for first, last in line.steps[line.side or "r"].cycles
+        if line.times[0] <= first and last <= line.times[-1]
+    ]
+    for cycle in cycles:
+        panel.plot(PERCENT, cycle, color=color, ls=line.style, lw=0.7, alpha=0.5)
+    if cycles:
+        panel.plot(PERCENT, np.mean(cycles, axis=0), color=color, ls=line.style, lw=2.0)
+
+
+def _residuals(trial: Trial, name: str) -> Iterator[str]:
+    for outcome in trial.outcomes:
+        root = _root(outcome.evidence)
+        for table in _dynamics(outcome):
+            kinds = {
+                unit: [label for label in table.columns if label.endswith(ending) and label[: -len(ending)] in root]
+                for ending, unit in (("_force", "force (N)"), ("_moment", "moment (N m)"))
+            }
+            if not any(kinds.values()):
+                continue
+            figure = figure_of("", (11.0, 3.0))
+            for panel, (unit, labels) in zip(figure.subplots(1, 2), kinds.items(), strict=True):
+                for color, label in zip(COLORS, labels, strict=False):
+                    panel.plot(table.times, table[label], color=color, lw=1.4, label=label.rpartition("_")[0])
+                panel.set_ylabel(unit)
+                panel.legend(frameon=False, fontsize=8)
+                _tidy(panel, "time (s)")
+            note = "What the joint to ground has to push, though nothing does in life."
+            yield f'<h2>Residuals{html.escape(name)}</h2><p class="note">{note}</p>{_image(figure)}'
+
+
+def _errors(trial: Trial, name: str) -> Iterator[str]:
+    evidence = trial.evidence
+    if evidence is None:
+        return
+    if evidence.measured is not None and evidence.places is not None and evidence.markers:
+        errors = 100.0 * np.linalg.norm(evidence.places - evidence.measured, axis=2)
+        figure = _errors_over(evidence.times, evidence.markers, errors, "marker", "cm", [100.0 * end for end in ADVICE])
+        note = "Dashed: what OpenSim advises at most, 2 cm for the root mean square and 4 cm for the largest."
+        yield f'<h2>Marker errors{html.escape(name)}</h2><p class="note">{note}</p>{_image(figure)}'
+    if evidence.angles is not None and evidence.sensors:
+        figure = _errors_over(evidence.times, evidence.sensors, np.degrees(evidence.angles), "sensor", "deg", ())
+        note = "Angles from the measured orientations."
+        yield f'<h2>Sensor errors{html.escape(name)}</h2><p class="note">{note}</p>{_image(figure)}'
+
+
+def _errors_over(
+    times: Array, names: Sequence[str], errors: Array, noun: str, unit: str, limits: Sequence[float]
+) -> Any:
+    """Errors (t, m) over time, with limits of the root mean square and the largest, and the worst by name."""
+    seen = np.isfinite(errors)
+    filled = np.where(seen, errors, 0.0)
+    rms = np.sqrt((filled**2).sum(axis=1) / np.maximum(seen.sum(axis=1), 1))
+    figure = figure_of("", (11.0, 3.4))
+    over, beside = figure.subplots(1, 2, width_ratios=(2, 1))
+    over.plot(times, rms, color=COLORS[0], lw=1.6, label="root mean square")
+    over.plot(times, filled.max(axis=1), color=COLORS[1], lw=1.2, label="largest")
+    for limit, color in zip(limits, COLORS, strict=False):
+        over.axhline(limit, color=color, lw=0.8, ls="--")
+    over.set_ylabel(f"{noun} error ({unit})")
+    over.set_ylim(bottom=0.0)
+    over.legend(frameon=False, fontsize=8)
+    _tidy(over, "time (s)")
+    each = np.sqrt((filled**2).sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
+    worst = np.argsort(-each)[:WORST][::-1]
+    beside.barh([names[place] for place in worst], each[worst], color=COLORS[0], height=0.7)
+    beside.tick_params(axis="y", labelsize=8)
+    beside.set_title(f"worst {noun}s", fontsize=10, loc="left")
+    _tidy(beside, f"root mean square ({unit})")
+    return figure
+
+
+def _legend(figure: Any, lines: Sequence[_Line]) -> None:
+    from matplotlib.lines import Line2D
+
+    sides = [Line2D([], [], color=color, label=name) for side, (color, name) in SIDES.items() if name and any(
+        line.side == side for line in lines
+    )]  # fmt: skip
+    trials = dict.fromkeys((line.label, line.style) for line in lines)
+    styles = [Line2D([], [], color="#444444", ls=ls, label=label) for label, ls in trials] if len(trials) > 1 else []
+    if sides or styles:
+        figure.legend(handles=[*sides, *styles], loc="outside upper right", ncols=6, frameon=False, fontsize=9)
+
+
+def _tidy(panel: Any, label: str) -> None:
+    panel.grid(True, color="0.92", lw=0.8)
+    panel.set_axisbelow(True)
+    panel.spines[["top", "right"]].set_visible(False)
+    panel.tick_params(labelsize=8)
+    panel.margins(x=0.0)
+    panel.set_xlabel(label, fontsize=8)
+
+
+def _image(figure: Any) -> str:
+    out = io.BytesIO()
+    figure.savefig(out, format="svg")
+    return f'<img alt="" src="data:image/svg+xml;base64,{base64.b64encode(out.getvalue()).decode()}">'

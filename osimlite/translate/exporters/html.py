@@ -1,0 +1,18 @@
+"""A page for browsers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from osimlite.translate.exporters import Exporter
+
+if TYPE_CHECKING:
+    from osimlite.view.shown import Shown
+
+
+def _write(shown: Shown, path: Path) -> str:
+    return f"{shown.write_page(path)} ({path.stat().st_size / 1e6:.1f} MB)"
+
+
+EXPORTER = Exporter("html", "view", "Write one page that needs no server and no network.", _write)

@@ -1,0 +1,332 @@
+"""A model in MuJoCo with OpenSim's own laws: MuJoCo moves the bodies, osimlite says what follows and what pushes.
+
+MuJoCo has neither splines nor the forces of OpenSim, but it calls back. A `Driver` writes the exact functions of the
+coordinates into MuJoCo's equalities before every step, gives the generalized forces of all muscles, contacts, limits,
+springs and bushings at every evaluation, wrapped paths and elastic tendons included, and lets MuJoCo integrate their
+states among its own::
+
+    driver = osimlite.mjcf.Driver(osimlite.read("gait.osim"))
+    driver.data.actuator("soleus_r").ctrl = 0.3
+    driver.step(1000)
+    driver.data.body("pelvis").xpos
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from osimlite.base.require import require
+from osimlite.mechanics.kernels.layout import ITEM, MODEL
+from osimlite.mechanics.multibody.functions import Constant, Function, Polynomial
+from osimlite.mechanics.multibody.mechanism import Values
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.model import Model
+from osimlite.simulation.elements import force_elements
+from osimlite.simulation.robot.drivers import coordinate_drivers
+from osimlite.simulation.robot.principal_axes import principal_axes
+from osimlite.simulation.system import System
+from osimlite.translate.mjcf.draft import Version
+from osimlite.translate.mjcf.driven import STATES
+from osimlite.translate.mjcf.export import to_mjcf
+
+Integrator = Literal["Euler", "RK4", "implicit", "implicitfast"]
+
+
+class _Followed(NamedTuple):
+    """A joint that follows others, or time: its equality, address and dof, addresses and dofs of what it follows."""
+
+    equality: int
+    own: int
+    dof: int
+    addresses: list[int]
+    leaders: list[int]
+    function: Function
+    fitted: bool
+
+    def at(self, data: Any) -> tuple[float, Array, float, float]:
+        """Where the function has the joint, its gradient, its rate, and what its curvature adds to the acceleration."""
+        x, rates = (data.qpos[self.addresses], data.qvel[self.leaders]) if self.leaders else (data.time, 1.0)
+        value, *derivatives = self.function.evaluate(np.atleast_1d(x))
+        (gradient, hessian), rates = map(np.array, derivatives), np.atleast_1d(rates)
+        return value, gradient, float(gradient @ rates), float(rates @ hessian @ rates)
+
+
+class Driver:
+    """A model that MuJoCo moves by OpenSim's laws.
+
+    MuJoCo's callbacks are one set for the whole process: they are the driver's while it steps, and put back after.
+
+    Args:
+        model: what moves.
+        timestep: of MuJoCo (s).
+        integrator: of MuJoCo.
+        equilibrate: start muscles in equilibrium of fibers and tendon.
+        file: what ``osimlite translate --driver`` wrote of the model, with what you added: a scene, sensors, cameras.
+        folder: where the model's file is, and the files that it names.
+        geometry: more folders to look for mesh files in.
+
+    Attributes:
+        mjcf: the translation, which has the account of what the driver does not compute.
+        model: MuJoCo's ``MjModel``; ``ctrl`` of its actuators are the controls of the model's, added to what the
+            model's controllers make of them.
+        data: MuJoCo's ``MjData``.
+        system: the forces.
+
+    Raises:
+        MissingDependency: mujoco is not installed.
+        ModelError: the model is not a mechanism.
+        UnsupportedError: it uses a joint or constraint that osimlite cannot compute.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        *,
+        timestep: float = 1e-3,
+        integrator: Integrator = "RK4",
+        equilibrate: bool = False,
+        file: str | Path | None = None,
+        folder: str | Path | None = None,
+        geometry: Sequence[str | Path] = (),
+    ) -> None:
+        self._mujoco: Any = require("mujoco", extra="mujoco", purpose="the driver of MuJoCo")
+        version: Version = 3 if self._mujoco.__version__.startswith("3.") else 4
+        self.mjcf = to_mjcf(model, mujoco=version, driver=True, folder=folder, geometry=geometry)
+        if file is None:
+            self.model = self._mujoco.MjModel.from_xml_string(self.mjcf.text, self.mjcf.files)
+        else:
+            self.model = self._mujoco.MjModel.from_xml_path(str(file))
+        self.model.opt.timestep = timestep
+        self.model.opt.jacobian = self._mujoco.mjtJacobian.mjJAC_DENSE
+        self.model.opt.integrator = getattr(self._mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+        self.data = self._mujoco.MjData(self.model)
+        self._mechanism = mechanism = self.mjcf.robot.mechanism
+        self._turns = not all(body.mobilizer.speeds_are_rates for body in mechanism.bodies)
+        self._restore_inertias()
+        forces = force_elements(model, mechanism, skip_unsupported=True, folder=folder)
+        self.system = System(mechanism, forces)
+        self._equilibrate = equilibrate
+        self._open_controls()
+        self._places = np.array(sorted(self.mjcf.leads), dtype=int)
+        leads = [self.mjcf.leads[place] for place in self._places]
+        joints = [self.model.joint(lead.joint) for lead in leads]
+        self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=int)
+        self._dofs = np.array([joint.dofadr[0] for joint in joints], dtype=int)
+        self._slopes, self._starts = np.array([lead.line for lead in leads]).reshape(-1, 2).T
+        led = set(self.mjcf.leads)
+        self._following = {k: each for k, each in coordinate_drivers(self.mjcf.robot).items() if k not in led}
+        self._followed = [self._followed_by(name) for name in self.mjcf.followers]
+        self._free = np.setdiff1d(np.arange(self.model.nv), [followed.dof for followed in self._followed])
+        self._rates: list[float] = []
+        self._failure: BaseException | None = None
+        self.reset()
+
+    # ------------------------------------------------------------------------------------------------- states
+    def reset(self) -> None:
+        """Go back to the default pose, and to where the states of the forces start."""
+        # Of a file without one, the state is that of no keyframe.
+        self._mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
+        q, u, _ = self.state()
+        y = self.system.state.pack(q.tolist(), u.tolist())
+        if self._equilibrate:
+            y = self.system.equilibrated(0.0, y)
+        if self._states >= 0:
+            self.data.act[:] = self.system.state.auxiliary(y)
+        self.set_state(q, u)
+
+    def forward(self) -> None:
+        """Compute everything that follows from the present state, without moving.
+
+        Raises:
+            SimulationError: a force has no value in it.
+        """
+        self._follow()
+        with self._called_back():
+            self._mujoco.mj_forward(self.model, self.data)
+
+    def state(self) -> tuple[Array, Array, Array]:
+        """Values (n,) and generalized speeds (n,) of the coordinates, and the auxiliary states of the forces (z,)."""
+        return (*self._coordinates(self.data)[:2], np.array(self.data.act))
+
+    def set_state(self, q: Values, u: Values) -> None:
+        """Put all joints where values and generalized speeds of the coordinates have them."""
+        mechanism, robot = self._mechanism, self.mjcf.robot
+        rates = mechanism.coordinate_rates(q, u)
+        for name, value in self.mjcf.joint_values(q).items():
+            self.data.joint(name).qpos[0] = value
+        for joint, rate in zip(robot.moving, robot.joint_jacobian(q) @ rates, strict=True):
+            self.data.joint(joint.name).qvel[0] = rate
+        self.data.qvel[self._dofs] = rates[self._places] * self._slopes
+        self.forward()
+
+    def step(self, count: int = 1) -> None:
+        """Go on by some time steps.
+
+        Raises:
+            SimulationError: a force has no value in the state that is reached.
+        """
+        with self._called_back():
+            for _ in range(count):
+                self._mujoco.mj_step(self.model, self.data)
+                self._follow()
+
+    # ---------------------------------------------------------------------------------------------- callbacks
+    @contextmanager
+    def _called_back(self) -> Iterator[None]:
+        mujoco = self._mujoco
+        before = mujoco.get_mjcb_control(), mujoco.get_mjcb_act_dyn()
+
+        def push(model: Any, data: Any) -> None:
+            if before[0] is not None:
+                before[0](model, data)
+            self._push(data)
+
+        mujoco.set_mjcb_control(push)
+        mujoco.set_mjcb_act_dyn(self._change)
+        try:
+            yield
+        finally:
+            mujoco.set_mjcb_control(before[0])
+            mujoco.set_mjcb_act_dyn(before[1])
+        if self._failure is not None:
+            failure, self._failure = self._failure, None
+            raise failure
+
+    def _push(self, data: Any) -> None:
+        """Add the generalized forces of the model's laws to the passive ones."""
+        if self._failure is not None or not self.model.nv:
+            return
+        try:
+            q, u, slopes = self._coordinates(data)
+            state = self.system.state
+            if len(self._controls):
+                self.system.numbers[self._controls] = data.ctrl[: len(self._controls)]
+            row = self.system.applied(data.time, state.pack(q.tolist(), u.tolist(), data.act.tolist()))
+        except Exception as failure:
+            # Python's errors do not pass through MuJoCo.
+            self._failure = failure
+            return
+        count = len(state.order)
+        self._rates = row[2 * count :]
+        forces = np.zeros(len(q))
+        forces[list(state.order)] = row[count : 2 * count]
+        if self._turns:
+            forces[:] = np.linalg.solve(self._mechanism.rate_matrix(q).T, forces)
+        for place, (leader, slope) in slopes.items():
+            forces[leader] += slope * forces[place]
+        data.qfrc_passive[self._dofs] += forces[self._places] / self._slopes
+        self._hold(data)
+
+    def _hold(self, data: Any) -> None:
+        """Add the forces of all equalities, with which joints accelerate as those that they follow.
+
+        MuJoCo's own leave a ten-thousandth of the difference. With these forces, and told what the curvature asks for,
+        which MuJoCo leaves out, nothing is left to them but to take back errors of position and speed.
+        """
+        if not data.ne:
+            return
+        # Accelerations are moves @ those of the other joints + wanted.
+        moves, wanted = np.eye(self.model.nv), np.zeros(self.model.nv)
+        for followed in self._followed:
+            _, gradient, _, wanted[followed.dof] = followed.at(data)
+            moves[followed.dof, followed.dof] = 0.0
+            if followed.leaders:
+                moves[followed.dof, followed.leaders] = gradient
+        moves = moves[:, self._free]
+        # The rows of equalities stand first, in the order of the equalities.
+        places = np.searchsorted(data.efc_id[: data.ne], [item.equality for item in self._followed])
+        others = np.setdiff1d(np.arange(data.ne), places)
+        rows = data.efc_J.reshape(-1, self.model.nv)[others]
+        applied = data.qfrc_passive - data.qfrc_bias + data.qfrc_applied
+        inertia = np.array([self._weighed(data, column) for column in moves.T.copy()]) @ moves
+        known = np.append(moves.T @ (applied - self._weighed(data, wanted)), data.efc_aref[others] - rows @ wanted)
+        held = rows @ moves
+        matrix = np.block([[inertia, held.T], [held, np.zeros((len(others), len(others)))]])
+        result = np.linalg.lstsq(matrix, known)[0] if len(others) else np.linalg.solve(matrix, known)
+        accelerations = moves @ result[: len(self._free)] + wanted
+        data.qfrc_passive += self._weighed(data, accelerations) - applied
+        # What `_follow` writes is for the start of a step: within it there are no errors to take back.
+        for place, item in zip(places, self._followed, strict=True):
+            rest = 0.0 if item.fitted else data.efc_aref[place]
+            data.efc_aref[place] = rest + (wanted if len(item.leaders) == 1 else accelerations)[item.dof]
+
+    def _weighed(self, data: Any, accelerations: Array) -> Array:
+        """The mass matrix times accelerations (nv,)."""
+        forces = np.empty(self.model.nv)
+        self._mujoco.mj_mulM(self.model, data, forces, accelerations)
+        return forces
+
+    def _change(self, _: Any, data: Any, actuator: int) -> float:
+        """Rates of the auxiliary states, which `_push` has computed at the same evaluation."""
+        if len(self._rates) == 1:
+            return self._rates[0]
+        if actuator == self._states:
+            data.act_dot[:] = self._rates
+        return 0.0
+
+    def _coordinates(self, data: Any) -> tuple[Array, Array, dict[int, tuple[int, float]]]:
+        """Values, speeds, and for coordinates without a joint the one that leads them and how fast."""
+        q, rates = self._mechanism.values({}), np.zeros(len(self._mechanism.coordinates))
+        q[self._places] = (data.qpos[self._qpos] - self._starts) / self._slopes
+        rates[self._places] = data.qvel[self._dofs] / self._slopes
+        slopes = {}
+        for place, (leader, function) in self._following.items():
+            q[place], gradient, _ = function.evaluate(q[[0 if leader is None else leader]])
+            if leader is not None:
+                slopes[place] = leader, float(gradient[0])
+                rates[place] = gradient[0] * rates[leader]
+        return q, self._mechanism.speeds_from_rates(q, rates) if self._turns else rates, slopes
+
+    # ----------------------------------------------------------------------------------------------- equalities
+    def _follow(self) -> None:
+        """Put joints where they must follow others, and write value, slope and curvature into the equalities."""
+        for followed in self._followed:
+            if followed.fitted:
+                value, gradient, rate, _ = followed.at(self.data)
+                self.data.qpos[followed.own], self.data.qvel[followed.dof] = value, rate
+                polynomial = np.zeros(5)
+                polynomial[0] = value
+                if len(followed.leaders) == 1:
+                    x, slope = self.data.qpos[followed.addresses[0]], gradient[0]
+                    bend = 0.5 * followed.function.evaluate((x,))[2][0][0]
+                    polynomial[:3] = value + x * (bend * x - slope), slope - 2.0 * bend * x, bend
+                self.model.eq_data[followed.equality, :5] = polynomial
+
+    # ------------------------------------------------------------------------------------------------ making ready
+    def _restore_inertias(self) -> None:
+        """Give bodies whose inertia MuJoCo refuses in a file their own."""
+        for record in self.mjcf.fidelity:
+            if record.kind == "inertia":
+                link, _ = self.mjcf.robot.link_of[record.component]
+                self.model.body(link.name).inertia[:] = principal_axes(link.inertia)[0]
+        self._mujoco.mj_setConst(self.model, self.data)
+
+    def _followed_by(self, name: str) -> _Followed:
+        follower, own = self.mjcf.followers[name], self.model.joint(name)
+        names = follower.arguments or (() if follower.leader is None else (follower.leader,))
+        leaders = [self.model.joint(each) for each in names]
+        return _Followed(
+            self.model.equality(name).id,
+            own.qposadr[0],
+            own.dofadr[0],
+            [leader.qposadr[0] for leader in leaders],
+            [leader.dofadr[0] for leader in leaders],
+            follower.function or Polynomial(follower.polynomial[::-1]),
+            follower.function is not None,
+        )
+
+    def _open_controls(self) -> None:
+        """Add MuJoCo's controls to those of the model: numbers, whose places among those of the forces are found."""
+        controls = self.system.forces.controls
+        none, one = (controls.driven(dict.fromkeys(controls.names, Constant(value))) for value in (0.0, 1.0))
+        self.system.drive(none)
+        place = self.system.structure[MODEL.CONTROLS]
+        first = self.system.structure[place + ITEM.NUMBERS] if place else 0
+        self._controls = first + np.flatnonzero(np.array(none.record()[1]) != np.array(one.record()[1]))
+        names = [self.model.actuator(k).name for k in range(self.model.nu)]
+        self._states = names.index(STATES) if STATES in names else -1

@@ -1,0 +1,24 @@
+"""What becomes of work whose process ends."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import pytest
+
+from osimlite.base.pools import WorkerLostError, processes
+
+
+def end(seconds: float) -> None:
+    time.sleep(seconds)
+    os._exit(1)
+
+
+def test_a_process_that_ended_is_told_where_results_are_awaited_and_where_work_is_given() -> None:
+    with processes(end, workers=1) as pool:
+        pool.submit("one", 0.0)
+        with pytest.raises(WorkerLostError, match="has ended"):
+            pool.result(60.0)
+        with pytest.raises(WorkerLostError, match="has ended"):
+            pool.submit("two", 0.0)

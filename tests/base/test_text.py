@@ -1,0 +1,109 @@
+"""What a terminal or the log of a CI job would obey is written out."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rapidfuzz import fuzz
+
+from osimlite.base.text import FEW_NAMES, harmless, json_lines, measure_similarity, nearest, visible
+from osimlite.errors import OsimliteError
+
+OBEYED = re.compile(r"[\0-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+anything = st.text(st.one_of(st.characters(codec=None), st.sampled_from("\n\r\t\x1b\x9b\x85\u202e\u2028\udce9[]m#:0 ")))
+
+
+@pytest.mark.parametrize(
+    ("text", "seen"),
+    [
+        ("knee_angle_r", "knee_angle_r"),
+        ("Größe 3 → λ", "Größe 3 → λ"),
+        ("a\n::error::b", r"a\n::error::b"),
+        ("\x1b]0;title\x07", r"\x1b]0;title\x07"),
+        ("\x9b2J\x85", r"\x9b2J\x85"),
+        ("\u202eevil\u2066\u200b\ufeff", r"\u202eevil\u2066\u200b\ufeff"),
+        ("caf\udce9", r"caf\xe9"),
+        ("\ud800\0", r"\ud800\x00"),
+    ],
+)
+def test_visible(text: str, seen: str) -> None:
+    assert visible(text) == seen
+
+
+@given(anything)
+def test_what_is_visible_is_one_line_and_stays_so(text: str) -> None:
+    seen = visible(text)
+    assert seen.isprintable() and visible(seen) == seen
+    assert text.isprintable() == (seen == text)
+
+
+@pytest.mark.parametrize(
+    ("text", "seen"),
+    [
+        ("\x1b[1;31mred\x1b[0m\n\ttab\r\n", "\x1b[1;31mred\x1b[0m\n\ttab\r\n"),
+        ("\x1b[2J\x1b]8;;x\x07\r", r"\x1b[2J\x1b]8;;x\x07\r"),
+        ("OpenSim::Body\n  ::error::x", "OpenSim::Body\n  \\x3a:error::x"),
+        ("\u3000::stop-commands::x", "\u3000\\x3a:stop-commands::x"),
+        ("a ##[add-mask]b ##vso[task.x] ## [1]", r"a \x23#[add-mask]b \x23#vso[task.x] ## [1]"),
+        ("##teamcity[y]", r"\x23#teamcity[y]"),
+    ],
+)
+def test_harmless(text: str, seen: str) -> None:
+    assert harmless(text) == seen
+
+
+def test_a_line_that_goes_on_holds_no_command_at_its_start() -> None:
+    assert harmless("::error::x", starts_line=False) == "::error::x"
+
+
+@given(anything)
+def test_nothing_is_obeyed(text: str) -> None:
+    seen = harmless(text)
+    left = re.sub(r"\x1b\[[0-9;]*m|\r\n", "", seen)
+    assert not OBEYED.search(left) and not re.search(r"##\w*\[", seen)
+    assert not any(line.lstrip().startswith("::") for line in seen.split("\n"))
+
+
+@given(anything)
+def test_json_for_programs_keeps_everything_and_passes_everywhere(text: str) -> None:
+    written = json_lines({text: [text]})
+    # Halves of characters are in no text that is exchanged: RFC 8259, 8.2.
+    whole = text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "surrogatepass")
+    whole = "".join(visible(c) if "\ud800" <= c <= "\udfff" else c for c in whole)
+    assert written.isascii() and json.loads(written) == {whole: [whole]}
+    assert next(iter(json.loads(written))).encode().decode() == whole
+    assert not OBEYED.search(written) and "##" not in written
+
+
+def test_errors_and_findings_are_one_line() -> None:
+    from osimlite.lint.diagnostic import Finding, Severity
+
+    error = OsimliteError("no body 'a\n::error::b'", file="\x1b[2J.osim", line=3)
+    assert str(error) == r"\x1b[2J.osim:3: no body 'a\n::error::b'" and "\n" in error.message
+    finding = Finding("OSIM101", "unknown-tag", Severity.ERROR, "a\nb", "\x9b.osim", suggestion="\u202e")
+    assert str(finding) == r"\x9b.osim: error OSIM101 a\nb (did you mean '\u202e'?)"
+
+
+names = st.text(st.sampled_from("abc_rlé"), max_size=12)
+
+
+@given(names, names)
+def test_similarity_is_that_of_rapidfuzz(word: str, text: str) -> None:
+    assert measure_similarity(word)(text) == fuzz.ratio(word, text)
+
+
+@given(names, st.lists(names, max_size=8))
+def test_few_names_are_compared_as_many_are(word: str, known: list[str]) -> None:
+    many = [*known, *("%" for _ in range(FEW_NAMES + 1))]
+    assert nearest(word, known) == nearest(word, many)
+
+
+def test_the_nearest_name() -> None:
+    assert nearest("Tibia_R", ["femur_r", "tibia_l", "tibia_r"]) == "tibia_r"
+    assert nearest("tibia", ["femur_r", "tibia_l", "tibia_r"]) == "tibia_l"
+    assert nearest("xyz", ["femur_r", "tibia_l"]) is None
+    assert nearest("xyz", []) is None

@@ -1,0 +1,98 @@
+"""What stands at a place of a text that may be broken."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("pygls", reason="needs pygls (extra 'lsp')")
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from osimlite.cli.language_server.analysis import Analysis
+from osimlite.cli.language_server.completion import completions
+from osimlite.cli.language_server.cursor import cursor_at
+from osimlite.cli.language_server.findings import diagnostics
+from osimlite.cli.language_server.hover import hover
+from osimlite.cli.language_server.navigation import folds, outline
+from osimlite.cli.language_server.project import Project
+from osimlite.cli.language_server.text import Text
+from osimlite.errors import OsimliteError
+from osimlite.io.document.reader import read_document
+from osimlite.io.document.source import Source
+
+SETUPS = Path(__file__).resolve().parents[3] / "fixtures" / "setups"
+WALKER = Path(__file__).resolve().parents[3] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
+TEXT = WALKER.read_text()
+
+
+def test_every_object_is_known_from_the_tags_before_it() -> None:
+    """The classes that the schema gives to tags are those that the reader makes of them."""
+    document = read_document(Source.of_characters(TEXT))
+    for item in document.model.walk():
+        number = item.source_index
+        if number is None:
+            continue
+        cursor = cursor_at(TEXT, document.source.spans[number].start + 1)
+        assert cursor.kind == "tag" and cursor.element is not None
+        assert (cursor.element.cls, cursor.element.number) == (type(item), number)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "kind", "word", "inner"),
+    [
+        ("<Model><BodySet><objects><Body name='a'><mass>1", "</mass>", "text", "1", "mass"),
+        ("<Model><ForceSet><objects><Hunt", " name='a'>", "tag", "Hunt", "objects"),
+        ("<Model><ForceSet></For", "ceSet>", "closing tag", "ForceSet", "ForceSet"),
+        ("<Model><ForceSet><objects><PathSpring name='a", "b'>", "attribute", "ab", "objects"),
+        ("<Model><a></b><BodySet>", "", "text", "", "BodySet"),
+        ("<Model><!-- <BodySet", " -->", "comment", "", "Model"),
+        ("<Model>\n<", "\n<BodySet/>", "tag", "", "Model"),
+    ],
+)
+def test_broken_texts(before: str, after: str, kind: str, word: str, inner: str) -> None:
+    cursor = cursor_at(before + after, len(before))
+    assert (cursor.kind, cursor.word) == (kind, word)
+    assert cursor.inner is not None and cursor.inner.tag == inner
+
+
+def test_a_part_is_told_by_the_name_of_its_property() -> None:
+    text = "<CustomJoint><SpatialTransform><TransformAxis name='rotation2'>"
+    inner = cursor_at(text, len(text)).inner
+    assert inner is not None and inner.spec is not None and inner.spec.tag == "rotation2"
+
+
+@settings(max_examples=40)
+@given(st.integers(0, len(TEXT)), st.integers(0, 60), st.sampled_from(["", "<", "</", "&", "-->", '"', "<Body", "é"]))
+def test_no_question_about_a_damaged_text_fails(offset: int, cut: int, put: str) -> None:
+    _ask("walker.osim", TEXT[:offset] + put + TEXT[offset + cut :], offset + len(put))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.sampled_from(["ik.xml", "scale.xml", "id.xml", "loads.xml", "so.xml", "controls.xml", "grf.mot", "walk.trc"]),
+    st.floats(0, 1), st.integers(0, 60), st.sampled_from(["", "<", "</", "&", "-->", '"', "<IKMarkerTask", "é", "\t"]),
+)  # fmt: skip
+def test_no_question_about_a_damaged_setup_or_table_fails(name: str, part: float, cut: int, put: str) -> None:
+    text = (SETUPS / name).read_text()
+    offset = int(part * min(len(text), 2000))
+    _ask(str(SETUPS / name), text[:offset] + put + text[offset + cut :], offset + len(put))
+
+
+def _ask(file: str, text: str, place: int) -> None:
+    analysis = Analysis(Text(text), file)
+    place = min(place, len(text))
+    hover(analysis, place)
+    completions(analysis, analysis if analysis.is_certain else None, place)
+    diagnostics(analysis)
+    outline(analysis)
+    folds(analysis)
+    target = analysis.target_at(place)
+    if target is not None:
+        try:
+            analysis.references(target)
+            Project().location(target)
+        except OsimliteError as error:  # pragma: no cover
+            pytest.fail(str(error))

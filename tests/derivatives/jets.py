@@ -1,0 +1,253 @@
+"""Exact derivatives of the kernels as they are, run as Python on numbers that carry theirs (R. E. Wengert, 1964).
+
+Nothing of how CasADi is given the kernels takes part: branches are taken as machine code takes them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from osimlite.mechanics.kernels.dynamics import evaluate
+from osimlite.mechanics.kernels.layout import MODEL, STAGE, WORK
+from osimlite.mechanics.laws.carried import is_nothing, settled
+from osimlite.simulation.elements.laws import law_function
+from osimlite.simulation.engines.linking import PYTHON, Program
+
+
+class Jet:
+    """A number v with its derivatives: g by everything (n,), a along one direction, h that of g along it."""
+
+    __array_ufunc__ = None
+    __slots__ = "a", "g", "h", "v"
+
+    def __init__(self, v: float, g: Any, a: float, h: Any) -> None:
+        self.v, self.g, self.a, self.h = v, g, a, h
+
+    def through(self, f: float, slope: float, bend: float) -> Jet:
+        """A function of it, of which the value and two derivatives are given."""
+        return Jet(f, slope * self.g, slope * self.a, slope * self.h + (bend * self.a) * self.g)
+
+    def __add__(self, b: Any) -> Jet:
+        if isinstance(b, Jet):
+            return Jet(self.v + b.v, self.g + b.g, self.a + b.a, self.h + b.h)
+        return Jet(self.v + b, self.g, self.a, self.h)
+
+    def __mul__(self, b: Any) -> Jet:
+        if not isinstance(b, Jet):
+            return Jet(self.v * b, self.g * b, self.a * b, self.h * b)
+        h = self.v * b.h + b.v * self.h + self.a * b.g + b.a * self.g
+        return Jet(self.v * b.v, self.v * b.g + b.v * self.g, self.v * b.a + b.v * self.a, h)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __neg__(self) -> Jet:
+        return Jet(-self.v, -self.g, -self.a, -self.h)
+
+    def __sub__(self, b: Any) -> Jet:
+        return self + -b
+
+    def __rsub__(self, b: Any) -> Jet:
+        return -self + b
+
+    def __truediv__(self, b: Any) -> Jet:
+        return self * (1.0 / b)
+
+    def __rtruediv__(self, b: Any) -> Any:
+        if self.v == 0.0:
+            return b * math.inf
+        inverse = 1.0 / self.v
+        return self.through(inverse, -inverse * inverse, 2.0 * inverse**3) * b
+
+    def __pow__(self, b: Any) -> Any:
+        if isinstance(b, Jet):
+            return MATHEMATICS["exp"](MATHEMATICS["log"](self) * b)
+        slope = b * self.v ** (b - 1) if b else 0.0
+        return self.through(self.v**b, slope, b * (b - 1) * self.v ** (b - 2) if b and b != 1 else 0.0)
+
+    def __rpow__(self, b: float) -> Jet:
+        rate, value = math.log(b), b**self.v
+        return self.through(value, rate * value, rate * rate * value)
+
+    def __mod__(self, b: Any) -> Jet:
+        rest = self.v % float(b)
+        times = round((self.v - rest) / float(b))
+        return self - times * b
+
+    def __abs__(self) -> Jet:
+        return -self if self.v < 0.0 else self
+
+    def __float__(self) -> float:
+        return float(self.v)
+
+    def __int__(self) -> int:
+        return int(self.v)
+
+    def __bool__(self) -> bool:
+        return bool(self.v != 0.0)
+
+    def __lt__(self, b: Any) -> bool:
+        return self.v < float(b)
+
+    def __le__(self, b: Any) -> bool:
+        return self.v <= float(b)
+
+    def __gt__(self, b: Any) -> bool:
+        return self.v > float(b)
+
+    def __ge__(self, b: Any) -> bool:
+        return self.v >= float(b)
+
+    def __eq__(self, b: object) -> bool:
+        return self.v == float(b)  # type: ignore[arg-type]
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def _bell(x: float) -> float:
+    return 2.0 / math.sqrt(math.pi) * math.exp(-x * x)
+
+
+SLOPES: dict[str, Callable[[float, float], tuple[float, float]]] = {
+    "sin": lambda x, f: (math.cos(x), -f),
+    "cos": lambda x, f: (-math.sin(x), -f),
+    "tan": lambda x, f: (1.0 + f * f, 2.0 * f * (1.0 + f * f)),
+    "asin": lambda x, f: ((1.0 - x * x) ** -0.5, x * (1.0 - x * x) ** -1.5),
+    "acos": lambda x, f: (-((1.0 - x * x) ** -0.5), -x * (1.0 - x * x) ** -1.5),
+    "atan": lambda x, f: (1.0 / (1.0 + x * x), -2.0 * x / (1.0 + x * x) ** 2),
+    "exp": lambda x, f: (f, f),
+    "expm1": lambda x, f: (f + 1.0, f + 1.0),
+    "log": lambda x, f: (1.0 / x, -1.0 / (x * x)),
+    "log1p": lambda x, f: (1.0 / (1.0 + x), -1.0 / (1.0 + x) ** 2),
+    "log10": lambda x, f: (1.0 / (x * math.log(10.0)), -1.0 / (x * x * math.log(10.0))),
+    "sinh": lambda x, f: (math.cosh(x), f),
+    "cosh": lambda x, f: (math.sinh(x), f),
+    "tanh": lambda x, f: (1.0 - f * f, -2.0 * f * (1.0 - f * f)),
+    "erf": lambda x, f: (_bell(x), -2.0 * x * _bell(x)),
+    "erfc": lambda x, f: (-_bell(x), 2.0 * x * _bell(x)),
+    "sqrt": lambda x, f: (0.5 / f, -0.25 / (f * x)) if x > 0.0 else (0.0, 0.0),
+}
+"""Of a function at x, where its value is f, the first and second derivatives."""
+
+
+def _of_one(name: str) -> Callable[[Any], Any]:
+    plain, slopes = getattr(math, name), SLOPES[name]
+
+    def function(x: Any) -> Any:
+        if not isinstance(x, Jet):
+            return plain(x)
+        value = plain(x.v)
+        return x.through(value, *slopes(x.v, value))
+
+    return function
+
+
+def _angle(y: Any, x: Any) -> Any:
+    if not (isinstance(x, Jet) or isinstance(y, Jet)):
+        return math.atan2(y, x)
+    # The smaller over the larger one has the same derivatives.
+    part = MATHEMATICS["atan"](y / x) if abs(x) > abs(y) else -MATHEMATICS["atan"](x / y)
+    return part + (math.atan2(float(y), float(x)) - part.v)
+
+
+def _copy_sign(x: Any, y: float) -> Any:
+    """Return x with the sign of y; at x = 0 its slope is the one that `SLOPES` of `carrying.py` has there."""
+    if not isinstance(x, Jet):
+        return math.copysign(x, y)
+    value = math.copysign(x.v, y)
+    # |x| has no derivative at 0: a number that is not negative keeps its derivatives unless the sign is changed.
+    same_sign = (x.v < 0.0) == (value < 0.0)
+    return x.through(value, 1.0 if same_sign else -1.0, 0.0)
+
+
+MATHEMATICS: dict[str, Callable[..., Any]] = {name: _of_one(name) for name in SLOPES} | {
+    "atan2": _angle,
+    "radians": lambda x: x * (math.pi / 180.0),
+    "degrees": lambda x: x * (180.0 / math.pi),
+    "hypot": lambda *x: MATHEMATICS["sqrt"](sum(each * each for each in x)),
+    "copysign": lambda x, y: _copy_sign(x, float(y)),
+    "floor": lambda x: math.floor(float(x)),
+    "ceil": lambda x: math.ceil(float(x)),
+    "isnan": lambda x: math.isnan(float(x)),
+    "isfinite": lambda x: math.isfinite(float(x)),
+}
+
+
+def _settled(root: Any, error: Any, slope: Any) -> Any:
+    if not isinstance(error, Jet):
+        return root
+    by, own = 1.0 / float(slope), root if isinstance(root, Jet) else Jet(root, 0.0, 0.0, 0.0)
+    return Jet(own.v, own.g - by * error.g, own.a - by * error.a, own.h)
+
+
+def _is_nothing(number: Any) -> bool:
+    return number == 0.0 and not (isinstance(number, Jet) and (np.any(number.g) or number.a))
+
+
+SAID = {settled: _settled, is_nothing: _is_nothing}
+"""What laws say of derivatives."""
+OURS = "osimlite.mechanics.laws", "osimlite.mechanics.kernels", "osimlite.simulation.elements"
+"""Where kernels and laws are."""
+
+
+@contextmanager
+def _carried(functions: list[Any]) -> Iterator[None]:
+    """While the mathematics of functions, and of all that they call, is that of jets."""
+    done: dict[int, Any] = {}
+    changed: list[tuple[dict[str, Any], str, Any]] = []
+    while functions:
+        scope = functions.pop().__globals__
+        if id(scope) in done:
+            continue
+        done[id(scope)] = scope
+        for name, value in [*scope.items()]:
+            if getattr(value, "__module__", "") == "math":
+                changed.append((scope, name, value))
+                scope[name] = MATHEMATICS[value.__name__]
+            elif value is settled or value is is_nothing:
+                changed.append((scope, name, value))
+                scope[name] = SAID[value]
+            elif getattr(value, "__module__", "").startswith(OURS) and hasattr(value, "__globals__"):
+                functions.append(value)
+        changed.append((scope, "float", float))
+        scope["float"] = lambda x: x if isinstance(x, Jet) else float(x)
+    try:
+        yield
+    finally:
+        for scope, name, value in changed:
+            if value is float:
+                del scope[name]
+            else:
+                scope[name] = value
+
+
+def carried(packed: Any, t: float, y: list[float], controls: list[float], along: Any) -> tuple[Any, Any, Any]:
+    """The derivative (n,) of a state y (n,), its own by the state (n, n), and the derivative of that along a direction.
+
+    Args:
+        packed: the model.
+        t: time, s.
+        y: in the order of the packed model.
+        controls: of its actuators.
+        along: the direction (n,).
+    """
+    program = Program(packed, PYTHON)
+    s = program.ints
+    s[MODEL.CONTROLS] = 0
+    w = np.zeros(int(s[MODEL.WORK_SIZE])).astype(object)
+    w[WORK.TIME] = t
+    first = s[MODEL.WORK_CONTROL]
+    w[first : first + len(controls)] = controls
+    one, none = np.eye(len(y)), np.zeros(len(y))
+    state = np.array([Jet(v, one[k], float(along[k]), none) for k, v in enumerate(y)] + [None], dtype=object)[:-1]
+    f = np.zeros(len(y)).astype(object)
+    kernels = [*packed.laws, *(k for k in packed.kernels.values() if isinstance(k, str))]
+    with _carried([evaluate, *map(law_function, kernels)]):
+        evaluate(s, packed.numbers.astype(object), w, state, f, STAGE.ACCELERATION)
+    found = [each if isinstance(each, Jet) else Jet(float(each), none, 0.0, none) for each in f]
+    value, slopes, bends = (np.array([getattr(e, part) for e in found]) for part in ("v", "g", "h"))
+    return value, slopes.reshape(one.shape), bends.reshape(one.shape)

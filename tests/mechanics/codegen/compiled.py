@@ -1,0 +1,74 @@
+"""C++ text of kernels as functions that Python calls, and the same functions as Python on the same vectors."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import os
+import shlex
+import shutil
+import struct
+import subprocess
+from array import array
+
+import pytest
+
+from osimlite.mechanics.codegen.cplusplus import HEADER, header_text
+
+COMPILER = os.environ.get("CXX") or next(filter(None, map(shutil.which, ("clang++", "g++", "c++"))), None)
+needs_compiler = pytest.mark.skipif(COMPILER is None, reason="needs a C++ compiler on the PATH, or in CXX")
+
+# A function that only tests use may have variables that nothing reads.
+WARNINGS = "-Wall -Wextra -Wpedantic -Werror -Wno-unused -Wno-unused-parameter"
+FLAGS = "-std=c++17 -fPIC -shared -fvisibility=hidden -ffp-contract=off -fno-exceptions"
+SIZE = 40
+"""Length of the vector of results."""
+
+
+def compile_text(folder, text, *flags, compiler=COMPILER, name="kernels"):
+    """Compile C++ text without a warning, and return the library.
+
+    Args:
+        folder: for the files.
+        text: of one translation unit.
+        flags: for the compiler, `-O1` if there are none.
+        compiler: the command.
+        name: of the files.
+    """
+    (folder / HEADER).write_text(header_text())
+    source, library = folder / f"{name}.cpp", folder / f"{name}.so"
+    source.write_text(text)
+    command = [*shlex.split(compiler), *FLAGS.split(), *WARNINGS.split(), *(flags or ["-O1"])]
+    result = subprocess.run([*command, source.name, "-o", library.name], cwd=folder, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr[:5000]
+    return ctypes.CDLL(str(library))
+
+
+def call_library(library, symbol, ints, floats, count):
+    """Call an exported kernel of integers, floats, results and a count.
+
+    Returns:
+        What it returns, and the three vectors after the call.
+    """
+    kernel = getattr(library, symbol)
+    kernel.restype = ctypes.c_int64
+    kernel.argtypes = [*[ctypes.c_void_p] * 3, ctypes.c_int64]
+    vectors = array("q", ints), array("d", floats), array("d", [0.0] * SIZE)
+    result = kernel(*(vector.buffer_info()[0] for vector in vectors), count)
+    return [result, *(vector.tolist() for vector in vectors)]
+
+
+def call_python(function, ints, floats, count):
+    """Call a kernel as Python; the results are those of `call_library`."""
+    vectors = array("q", ints), array("d", floats), array("d", [0.0] * SIZE)
+    result = function(*map(memoryview, vectors), count)
+    return [int(result), *(vector.tolist() for vector in vectors)]
+
+
+def are_same_bits(one, two):
+    """Return whether two results are the same numbers; every NaN is the same."""
+    if isinstance(one, list):
+        return len(one) == len(two) and all(map(are_same_bits, one, two))
+    if isinstance(one, float) and isinstance(two, float):
+        return struct.pack("d", one) == struct.pack("d", two) or (math.isnan(one) and math.isnan(two))
+    return one == two

@@ -1,0 +1,89 @@
+"""Motions and derivatives of models by the kernels of one library, as digests of their bits.
+
+Run as a program: the path of a shared library with all kernels, the number of motions, and the number of models whose
+derivatives are computed; with `-` for the path, the kernels that osimlite takes anyway.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import osimlite
+from osimlite.models.jumper import jumper
+from osimlite.models.walkers import furthest_walker
+from osimlite.simulation.engines import machine_code
+from osimlite.simulation.many import run_many
+from osimlite.simulation.run import Simulation
+
+ROOT = Path(__file__).parents[3]
+DURATION = 0.1
+"""Seconds of each motion."""
+
+
+def list_models() -> dict[str, Any]:
+    """Return functions that make models, by name: built-in ones, fixtures, and those of the shared folder."""
+    files = [ROOT / "fixtures/kinematics/mixed_joint_tree.osim"]
+    shared = next((folder for folder in (ROOT.parent / "shared", ROOT.parents[1] / "shared") if folder.is_dir()), None)
+    if shared is not None:
+        files += sorted(shared.glob("corpus/models/*/*.osim"))
+    made = {"walker": furthest_walker, "jumper": jumper}
+    return made | {file.parent.name + "/" + file.stem: lambda file=file: osimlite.read(file) for file in files}
+
+
+def load_kernels(path: str) -> None:
+    """Take all kernels from a library."""
+    library = ctypes.CDLL(path)
+    names = json.loads(Path(path).with_suffix(".json").read_text(encoding="utf-8"))
+    for name, symbol in names.items():
+        machine_code._addresses[name] = ctypes.cast(getattr(library, symbol), ctypes.c_void_p).value or 0
+
+
+def describe(*arrays: Any) -> str:
+    """Return a digest of numbers; every NaN is the same."""
+    parts = [np.where(np.isnan(array), np.nan, array).tobytes() for array in map(np.asarray, arrays)]
+    return hashlib.sha256(b"".join(parts)).hexdigest()[:16]
+
+
+def run(model: Any) -> str:
+    """Return a digest of two motions of a model."""
+    engine: Any = Simulation(model, "compiled", skip_unsupported=True).engine
+    start = np.array(engine.found())
+    starts = np.tile(start, (2, 1))
+    moving = 2 * len(engine.order)
+    starts[:, :moving] += np.random.default_rng(0).uniform(-0.01, 0.01, (2, moving))
+    result = run_many(engine, starts, DURATION, accuracy=1e-4, threads=1)
+    return describe(result.states, result.counts)
+
+
+def differentiate(model: Any) -> str:
+    """Return a digest of the rates of a model and their derivatives."""
+    made = osimlite.tangents(model)
+    controls = np.random.default_rng(1).uniform(0.05, 0.95, len(made.controls))
+    return describe(*made.linear(0.1, made.x, controls))
+
+
+def collect(action: Any, count: int) -> dict[str, str]:
+    """Return the digests of so many models; those that cannot be computed are left out."""
+    found: dict[str, str] = {}
+    for name, make in list_models().items():
+        if len(found) == count:
+            break
+        try:
+            found[name] = action(make())
+        except osimlite.OsimliteError:
+            continue
+    return found
+
+
+if __name__ == "__main__":
+    if sys.argv[1] != "-":
+        load_kernels(sys.argv[1])
+    motions, models = map(int, sys.argv[2:])
+    print(json.dumps({"motions": collect(run, motions), "tangents": collect(differentiate, models)}))

@@ -1,0 +1,163 @@
+"""All kernels of osimlite as C++: by every compiler and at every level the same bits, and no undefined behaviour."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from array import array
+
+import pytest
+
+from osimlite.mechanics.codegen.cplusplus import write_library
+from osimlite.mechanics.codegen.reader import find_tree
+from osimlite.mechanics.codegen.sources import collect_functions
+from osimlite.simulation.elements.laws import library_laws, symbol_of
+from tests.conftest import ROOT
+from tests.mechanics.codegen import motions, pure_functions
+from tests.mechanics.codegen.compiled import are_same_bits, compile_text, needs_compiler
+
+pytestmark = [pytest.mark.full, pytest.mark.timeout(3600)]
+
+STRICT = "-fno-fast-math", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-slp-vectorize", "-w"
+CALLS = 100
+"""Calls of each function of numbers."""
+
+
+def compilers():
+    """Return the compilers that are installed."""
+    return [name for name in ("g++", "clang++") if shutil.which(name)]
+
+
+@pytest.fixture(scope="module")
+def wrapped():
+    """The kernels that call functions of numbers, by these."""
+    return pure_functions.wrap_functions()
+
+
+@pytest.fixture(scope="module")
+def text(wrapped):
+    """All of these kernels as C++."""
+    return write_library({kernel.__name__: (kernel, 0) for kernel in wrapped.values()})
+
+
+def has_powers(function):
+    """Return whether a function, or one that it calls, takes powers: Python rounds those by integers once."""
+    return any(isinstance(node, ast.Pow) for part in collect_functions(function) for node in ast.walk(find_tree(part)))
+
+
+@needs_compiler
+def test_functions_of_numbers_are_those_of_python(wrapped, text, tmp_path):
+    library = compile_text(tmp_path, text, "-O2", *STRICT)
+    compared = different = 0
+    for function, kernel in wrapped.items():
+        may_differ = has_powers(function)
+        for number in range(CALLS):
+            ints, floats = pure_functions.make_arguments(kernel.__name__, number, 0.3 * (number % 2))
+            out = array("d", [0.0] * pure_functions.SIZE)
+            try:
+                kernel(memoryview(ints), memoryview(floats), memoryview(out), 0)
+            except (ArithmeticError, ValueError, IndexError, TypeError):
+                continue
+            result = pure_functions.call_compiled(library, kernel.__name__, ints, floats)
+            compared += 1
+            if not are_same_bits(result, out.tolist()):
+                different += 1
+                assert may_differ, (function.__qualname__, number)
+                assert result == pytest.approx(out.tolist(), rel=1e-10, abs=1e-290, nan_ok=True), function.__qualname__
+    assert len(wrapped) > 150 and compared > 0.5 * CALLS * len(wrapped) and different < 0.01 * compared
+
+
+@pytest.mark.skipif(len(compilers()) < 1, reason="needs g++ or clang++ on the PATH")
+def test_every_build_of_functions_gives_the_same_bits(wrapped, text, tmp_path):
+    levels = ["-O0"], ["-O2"], ["-O3"], ["-O3", "-march=native"]
+    builds = [
+        compile_text(tmp_path, text, *level, *STRICT, compiler=name, name=f"{name}{number}")
+        for name in compilers()
+        for number, level in enumerate(levels)
+    ]
+    for kernel in wrapped.values():
+        for number in range(CALLS // 4):
+            given = pure_functions.make_arguments(kernel.__name__, number, 0.3 * (number % 2))
+            first, *others = (pure_functions.call_compiled(build, kernel.__name__, *given) for build in builds)
+            assert all(are_same_bits(first, other) for other in others), (kernel.__name__, number)
+
+
+SANITIZERS = {
+    "undefined": "-fsanitize=undefined,float-cast-overflow,bounds -fno-sanitize-recover=all",
+    "address": "-fsanitize=address",
+}
+
+
+def environment(compiler, name):
+    """Return the variables with which a process can load a library that was built with a sanitizer."""
+    library = {"undefined": "libubsan.so", "address": "libasan.so"}[name]
+    path = subprocess.run(
+        [compiler, f"-print-file-name={library}"], capture_output=True, text=True, check=True
+    ).stdout.strip()
+    if not os.path.isabs(path):
+        pytest.skip(f"needs {library} of {compiler}")
+    options = {"ASAN_OPTIONS": "detect_leaks=0:detect_stack_use_after_return=1", "UBSAN_OPTIONS": "print_stacktrace=1"}
+    return {**os.environ, **options, "LD_PRELOAD": path, "PYTHONPATH": str(ROOT)}
+
+
+def run_module(module, *arguments, env=None):
+    """Run a module of these tests in a process of its own, and return what it prints."""
+    command = [sys.executable, "-m", module, *map(str, arguments)]
+    result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=env)
+    assert result.returncode == 0, result.stderr[-3000:]
+    return result.stdout
+
+
+@pytest.mark.skipif(not shutil.which("g++"), reason="needs g++ on the PATH")
+@pytest.mark.parametrize("name", SANITIZERS)
+def test_functions_have_no_undefined_behaviour(wrapped, text, tmp_path, name):
+    flags = shlex.split(SANITIZERS[name])
+    compile_text(tmp_path, text, "-O1", "-g", *flags, *STRICT, compiler="g++")
+    symbols = [kernel.__name__ for kernel in wrapped.values()]
+    calls = run_module(
+        pure_functions.__name__, tmp_path / "kernels.so", CALLS // 4, *symbols, env=environment("g++", name)
+    )
+    assert int(calls) == CALLS // 4 * len(wrapped)
+
+
+# ---------------------------------------------------------------------------------------------- whole models
+@pytest.fixture(scope="module")
+def kernels(tmp_path_factory):
+    """The text of all kernels, for floats and for numbers with derivatives, and their symbols by name."""
+    names = [*library_laws(0), *library_laws(16)]
+    text = write_library(pure_functions.all_kernels(0) | pure_functions.all_kernels(16))
+    return text, {name: symbol_of(name) for name in names}
+
+
+def build_kernels(kernels, folder, compiler, *flags):
+    """Compile all kernels for the program `motions`, and return the path of the library."""
+    text, symbols = kernels
+    name = f"{compiler}{''.join(flags[:1])}"
+    compile_text(folder, text, *flags, *STRICT, compiler=compiler, name=name)
+    (folder / f"{name}.json").write_text(json.dumps(symbols))
+    return folder / f"{name}.so"
+
+
+@pytest.mark.skipif(len(compilers()) < 1, reason="needs g++ or clang++ on the PATH")
+def test_motions_and_tangents_are_the_same_bits(kernels, tmp_path):
+    results = {}
+    for compiler in compilers():
+        for level in ("-O2", "-O3"):
+            library = build_kernels(kernels, tmp_path, compiler, level)
+            results[compiler, level] = json.loads(run_module(motions.__name__, library, 20, 10))
+    first, *others = results.values()
+    assert len(first["motions"]) >= 3 and len(first["tangents"]) >= 3
+    assert all(other == first for other in others), results
+
+
+@pytest.mark.skipif(not shutil.which("g++"), reason="needs g++ on the PATH")
+@pytest.mark.parametrize("name", SANITIZERS)
+def test_motions_have_no_undefined_behaviour(kernels, tmp_path, name):
+    library = build_kernels(kernels, tmp_path, "g++", "-O1", *shlex.split(SANITIZERS[name]))
+    found = json.loads(run_module(motions.__name__, library, 6, 3, env=environment("g++", name)))
+    assert len(found["motions"]) >= 3

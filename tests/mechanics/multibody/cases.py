@@ -1,0 +1,123 @@
+"""Mechanisms built from the cases in fixtures/kinematics, without any document in between."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import osimlite
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody import functions as f
+from osimlite.mechanics.multibody.joints import (
+    MOTIONS,
+    Mobilizer,
+    TransformAxis,
+    custom,
+    ellipsoid,
+    motion_types,
+    scapulothoracic,
+)
+from osimlite.mechanics.multibody.mechanism import (
+    CoordinateInfo,
+    MassProperties,
+    Mechanism,
+    MobileBody,
+)
+from osimlite.mechanics.multibody.motions import Motion
+from osimlite.mechanics.multibody.schema_functions import numeric
+from osimlite.mechanics.multibody.spatial import offset
+from osimlite.schema import functions as schema
+
+FIXTURES = Path(__file__).parents[3] / "fixtures" / "kinematics"
+
+
+@cache
+def load(name: str) -> Any:
+    """A JSON fixture, packed or not."""
+    packed = FIXTURES / f"{name}.gz"
+    if packed.exists():
+        return json.loads(gzip.decompress(packed.read_bytes()))
+    return json.loads((FIXTURES / name).read_text())
+
+
+def function(spec: dict[str, Any]) -> f.Function:
+    """The function that a case describes."""
+    return numeric(_component(spec), 1, "the function of a case")
+
+
+def _component(spec: dict[str, Any]) -> schema.Function:
+    fields = {name: tuple(value) if isinstance(value, list) else value for name, value in spec.items()}
+    kind = getattr(schema, str(fields.pop("type")))
+    if "function" in fields:
+        fields["function"] = _component(spec["function"])
+    component: schema.Function = kind(**fields)
+    return component
+
+
+def motions(joint_type: str, properties: dict[str, Any]) -> tuple[Motion, ...]:
+    """The motions of a joint with the properties that a case gives."""
+    match joint_type:
+        case "EllipsoidJoint":
+            return ellipsoid(properties["radii_x_y_z"])
+        case "ScapulothoracicJoint":
+            return scapulothoracic(
+                properties["thoracic_ellipsoid_radii_x_y_z"],
+                properties["scapula_winging_axis_origin"],
+                properties["scapula_winging_axis_direction"],
+            )
+        case "CustomJoint":
+            names = properties["coordinate_order"]
+            axes = [
+                TransformAxis(
+                    tuple(names.index(name) for name in axis["coordinates"]),
+                    axis["axis"],
+                    function(axis["function"]),
+                )
+                for axis in properties["axes"]
+            ]
+            return custom(axes[:3], axes[3:])
+    return MOTIONS[joint_type]
+
+
+def mechanism_of(case: dict[str, Any], *, turned_round: bool = False) -> Mechanism:
+    """Ground and one body, joined as a case of joint_kinematics_cases.json says; the body is the child.
+
+    With `turned_round` the body is the joint's parent and ground its child.
+    """
+    parts = motions(case["joint_type"], case["properties"])
+    count = len(case["coordinates"])
+    types = motion_types(parts, count)
+    mobilizer = Mobilizer(
+        joint="/jointset/j",
+        joint_type=case["joint_type"],
+        motions=parts,
+        coordinates=tuple(range(count)),
+        parent_frame=offset(**case["parent_offset"]),
+        child_frame=offset(**case["child_offset"]),
+        reversed=turned_round,
+    )
+    coordinates = tuple(
+        CoordinateInfo(item["name"], f"/jointset/j/{item['name']}", "/jointset/j", types[index])
+        for index, item in enumerate(case["coordinates"])
+    )
+    properties = MassProperties(1.3, np.array((0.1, -0.2, 0.05)), np.diag((0.3, 0.4, 0.5)))
+    body = MobileBody("C", "/bodyset/C", -1, properties, mobilizer)
+    return Mechanism("case", (body,), coordinates)
+
+
+def alone(mobilizer: Mobilizer) -> Mechanism:
+    """Ground and one body that a joint carries."""
+    names = [f"q{k}" for k in mobilizer.coordinates]
+    infos = tuple(CoordinateInfo(name, f"{mobilizer.joint}/{name}", mobilizer.joint, "coupled") for name in names)
+    return Mechanism("alone", (MobileBody("C", "/bodyset/C", -1, MassProperties(1.0), mobilizer),), infos)
+
+
+@cache
+def mixed_tree() -> Mechanism:
+    """The tree of fixtures/kinematics/mixed_joint_tree.osim: 10 bodies, 24 coordinates, 10 joint types."""
+    return build_mechanism(osimlite.read(FIXTURES / "mixed_joint_tree.osim"))

@@ -1,0 +1,95 @@
+"""Forces and accelerations: Newton's and Euler's equations of every body, projected on the speeds (Kane's form)."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from math import sqrt
+
+import numpy as np
+
+from osimlite.base.records import dataclass
+from osimlite.mechanics.kernels.constrained_dynamics import SAFE_MASS, SLIGHT
+from osimlite.mechanics.kernels.least_squares import ROUNDING
+from osimlite.mechanics.multibody.linear import shortest, solutions
+from osimlite.mechanics.multibody.spatial import Array, skews
+from tests.mechanics.multibody.independent.constraints import bond
+from tests.mechanics.multibody.independent.motion import Moved
+
+
+@dataclass(frozen=True, eq=False)
+class MassCentres:
+    """The b bodies of a mechanism at one state, seen from their mass centres, along ground's axes."""
+
+    state: Moved
+    masses: Array  # (b,), kg
+    inertias: Array  # about the mass centres (b, 3, 3), kg·m²
+    arms: Array  # from the body origins to the mass centres (b, 3), m
+    turning: Array  # from the n speeds to the angular velocities (b, 3, n)
+    moving: Array  # from the n speeds to the velocities of the mass centres (b, 3, n)
+
+    @classmethod
+    def of(cls, state: Moved) -> MassCentres:
+        """See a mechanism at `state` from its mass centres."""
+        masses, centres, inertias = state.mechanism.inertial
+        rotations, jacobians = state.rotations[:-1], state.jacobians[:-1]
+        arms = (rotations @ centres[:, :, None])[:, :, 0]
+        turning = jacobians[:, :3]
+        moving = jacobians[:, 3:] - skews(arms) @ turning
+        return cls(state, masses, rotations @ inertias @ rotations.transpose(0, 2, 1), arms, turning, moving)
+
+    def mass_matrix(self) -> Array:
+        """M (n, n) of the kinetic energy ½ uᵀ M u."""
+        matrix = _projected(self.turning, self.inertias @ self.turning)
+        matrix += _projected(self.moving, self.masses[:, None, None] * self.moving)
+        return 0.5 * (matrix + matrix.T)
+
+    def inertia_forces(self, body_accelerations: Array) -> Array:
+        """Generalized forces (n,) that give the bodies these spatial accelerations (b + 1, 6)."""
+        w = self.state.velocities[:-1, :3]
+        alpha, a = body_accelerations[:-1, :3], body_accelerations[:-1, 3:]
+        a_centre = a + np.cross(alpha, self.arms) + np.cross(w, np.cross(w, self.arms))
+        torques = _times(self.inertias, alpha) + np.cross(w, _times(self.inertias, w))
+        return _projected(self.turning, torques) + _projected(self.moving, self.masses[:, None] * a_centre)
+
+    def gravity_forces(self) -> Array:
+        """Generalized forces of gravity (n,)."""
+        weights = self.masses[:, None] * self.state.mechanism.gravity
+        return _projected(self.moving, weights)
+
+
+def acceleration(state: Moved, applied: Array) -> Array:
+    """Udot (n,) with M udot = f but for what makes G udot = b; by the null space of G, if M cannot be divided by."""
+    bodies, constraints = MassCentres.of(state), state.mechanism.constraints
+    matrix = bodies.mass_matrix()
+    right = applied + bodies.gravity_forces() - bodies.inertia_forces(state.biases)
+    if not constraints:
+        return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+    bonds = [bond(item, state) for item in constraints]
+    rows, values = np.concatenate([each.rows for each in bonds]), np.concatenate([each.drifts for each in bonds])
+    with suppress(np.linalg.LinAlgError):
+        factor = np.linalg.cholesky(matrix)
+        if np.min(factor.diagonal() ** 2 / matrix.diagonal()) > SAFE_MASS:
+            udot = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+            # What moves nothing by more than rounding binds nothing.
+            binding = np.where(np.abs(rows).max(axis=1, keepdims=True) > ROUNDING, rows, 0.0)
+            weighted = np.linalg.solve(factor, binding.T).T
+            # The second time mends the rounding of the first.
+            for _ in range(2):
+                push = shortest(weighted, values - rows @ udot, SLIGHT * sqrt(len(rows)))
+                udot = udot + np.linalg.solve(factor.T, push)
+            return udot
+    particular, free = solutions(rows, values)
+    reduced = np.linalg.solve(free.T @ matrix @ free, free.T @ (right - matrix @ particular))
+    return particular + free @ reduced
+
+
+def _times(matrices: Array, vectors: Array) -> Array:
+    """Each matrix (b, 3, 3) times its vector (b, 3)."""
+    return (matrices @ vectors[:, :, None])[:, :, 0]
+
+
+def _projected(jacobians: Array, loads: Array) -> Array:
+    """Sum over the bodies of each Jacobian (b, 3, n), transposed, times its load (b, 3) or loads (b, 3, m)."""
+    count, _, size = jacobians.shape
+    flat = jacobians.reshape(3 * count, size)
+    return flat.T @ loads.reshape(3 * count, *loads.shape[2:])

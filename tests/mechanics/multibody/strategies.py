@@ -1,0 +1,137 @@
+"""Random mechanisms and states for properties that must hold for every tree."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from hypothesis import strategies as st
+
+from osimlite.mechanics.multibody import body_constraints as b
+from osimlite.mechanics.multibody import functions as f
+from osimlite.mechanics.multibody.constraints import Constraint, Coupler, Prescribed
+from osimlite.mechanics.multibody.joints import (
+    MOTIONS,
+    Mobilizer,
+    TransformAxis,
+    constant_curvature,
+    custom,
+    ellipsoid,
+    motion_types,
+    scapulothoracic,
+)
+from osimlite.mechanics.multibody.mechanism import (
+    CoordinateInfo,
+    FramePlacement,
+    MassProperties,
+    Mechanism,
+    MobileBody,
+    StationPlacement,
+)
+from osimlite.mechanics.multibody.motions import Motion
+from osimlite.mechanics.multibody.spatial import Array, offset
+
+KINDS = ("point", "distance", "line", "weld", "rolling", "coupler", "prescribed")
+"""Of constraints."""
+
+JOINT_TYPES = (*MOTIONS, "EllipsoidJoint", "ScapulothoracicJoint", "ConstantCurvatureJoint", "CustomJoint")
+
+
+class Case(NamedTuple):
+    """A mechanism of n coordinates with a state and accelerations, each (n,)."""
+
+    mechanism: Mechanism
+    q: Array
+    u: Array
+    udot: Array
+
+
+def _radii(rng: np.random.Generator) -> Array:
+    """Radii of an ellipsoid (3,), m; of a mirrored one they are negative."""
+    return rng.uniform(0.1, 0.4, 3) * rng.choice((-1.0, 1.0))
+
+
+def motions_of(joint_type: str, rng: np.random.Generator) -> tuple[Motion, ...]:
+    """The motions of a joint type with random properties."""
+    if joint_type == "EllipsoidJoint":
+        return ellipsoid(_radii(rng))
+    if joint_type == "ConstantCurvatureJoint":
+        return constant_curvature(rng.uniform(0.2, 0.5), rng.uniform(-0.2, 0.2, 3).tolist())
+    if joint_type == "ScapulothoracicJoint":
+        return scapulothoracic(_radii(rng), rng.uniform(-0.1, 0.1, 2), rng.uniform(-1.0, 1.0))
+    if joint_type == "CustomJoint":
+        spline = f.SimmSpline((-1.5, -0.4, 0.3, 1.6), rng.uniform(-0.5, 0.5, 4))
+        axes = [
+            TransformAxis((0,), rng.normal(size=3), f.Linear(-1.0, 0.2)),
+            TransformAxis((1,), rng.normal(size=3), spline),
+            TransformAxis((0,), rng.normal(size=3), f.Sine(0.4, 1.3, 0.2, 0.1)),
+            TransformAxis((0,), rng.normal(size=3), f.Polynomial((0.3, -0.2, 0.5, 0.1))),
+            TransformAxis((1,), rng.normal(size=3), f.Scaled(-0.7, spline)),
+            TransformAxis((), rng.normal(size=3), f.Constant(0.07)),
+        ]
+        return custom(axes[:3], axes[3:])
+    return MOTIONS[joint_type]
+
+
+def coordinates_of(motions: tuple[Motion, ...]) -> int:
+    """How many coordinates the motions of a joint take."""
+    return 1 + max((place for motion in motions for place in motion.coordinates), default=-1)
+
+
+def _body(
+    index: int, parent: int, joint_type: str, turned_round: bool, first: int, rng: np.random.Generator
+) -> tuple[MobileBody, list[CoordinateInfo]]:
+    motions = motions_of(joint_type, rng)
+    count = coordinates_of(motions)
+    path = f"/jointset/j{index}"
+    frames = [offset(rng.uniform(-0.4, 0.4, 3), rng.uniform(-1.0, 1.0, 3)) for _ in range(2)]
+    mobilizer = Mobilizer(
+        path, joint_type, motions, tuple(range(first, first + count)), frames[0], frames[1], turned_round
+    )
+    half = rng.uniform(-0.3, 0.3, (3, 3))
+    properties = MassProperties(rng.uniform(0.5, 3.0), rng.uniform(-0.2, 0.2, 3), half @ half.T + 0.1 * np.eye(3))
+    types = motion_types(motions, count)
+    infos = [CoordinateInfo(f"q{first + k}", f"{path}/q{first + k}", path, types[k]) for k in range(count)]
+    return MobileBody(f"B{index}", f"/bodyset/B{index}", parent, properties, mobilizer), infos
+
+
+@st.composite
+def cases(draw: st.DrawFn, *, max_bodies: int = 5) -> Case:
+    """A random tree of random joints, some of them reversed, at a random state."""
+    count = draw(st.integers(1, max_bodies))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    bodies: list[MobileBody] = []
+    coordinates: list[CoordinateInfo] = []
+    for index in range(count):
+        joint_type = draw(st.sampled_from(JOINT_TYPES))
+        parent, turned_round = draw(st.integers(-1, index - 1)), draw(st.booleans())
+        body, infos = _body(index, parent, joint_type, turned_round, len(coordinates), rng)
+        bodies.append(body)
+        coordinates += infos
+    mechanism = Mechanism("random", tuple(bodies), tuple(coordinates), np.array((0.3, -9.5, 0.7)))
+    n = len(coordinates)
+    return Case(mechanism, rng.uniform(-1.2, 1.2, n), rng.uniform(-2.0, 2.0, n), rng.uniform(-3.0, 3.0, n))
+
+
+def constraint_of(kind: str, mechanism: Mechanism, rng: np.random.Generator) -> Constraint:
+    """A random constraint of a kind."""
+    one, two = rng.choice(range(-1, len(mechanism.bodies)), 2, replace=False).tolist()
+    first, second = (StationPlacement(body, rng.uniform(-0.3, 0.3, 3)) for body in (one, two))
+    match kind:
+        case "point":
+            return b.PointConstraint(first, second)
+        case "distance":
+            return b.DistanceConstraint(first, second, 0.5)
+        case "line":
+            return b.PointOnLineConstraint(first, rng.normal(size=3), second)
+        case "weld":
+            inner, outer = (offset(rng.uniform(-0.3, 0.3, 3), rng.uniform(-1.0, 1.0, 3)) for _ in range(2))
+            return b.WeldConstraint(FramePlacement(one, inner), FramePlacement(two, outer))
+        case "rolling":
+            return b.RollingConstraint(one, two, rng.normal(size=3), 0.3)
+        case "coupler":
+            places = rng.permutation(len(mechanism.coordinates))[:2].tolist()
+            return Coupler(
+                places[0], tuple(places[1:]), f.Polynomial((0.3, -0.2, 0.1)) if places[1:] else f.Constant(0.2)
+            )
+    return Prescribed(int(rng.integers(len(mechanism.coordinates))), f.Sine(0.4, 3.0, 0.2, 0.1))

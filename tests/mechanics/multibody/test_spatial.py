@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from osimlite.mechanics.multibody.spatial import (
+    angles_xyz,
+    cross,
+    inverse,
+    offset,
+    quaternion,
+    rotation_about,
+    rotation_xyz,
+    skew,
+    transform,
+)
+from tests.mechanics.multibody.independent.motion import RelativeMotion
+
+vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(np.array)
+seeds = st.integers(0, 2**32 - 1)
+AXES = np.eye(3)
+
+
+@given(vectors, vectors)
+def test_cross_and_skew_are_the_cross_product(a, b):
+    assert cross(a, b) == pytest.approx(np.cross(a, b), abs=1e-15)
+    assert skew(a) @ b == pytest.approx(np.cross(a, b), abs=1e-14)
+
+
+@given(vectors)
+def test_body_fixed_angles_are_three_turns_in_a_row(angles):
+    turns = [rotation_about(axis, angle) for axis, angle in zip(AXES, angles, strict=True)]
+    assert rotation_xyz(angles) == pytest.approx(turns[0] @ turns[1] @ turns[2], abs=1e-15)
+
+
+@given(vectors, st.sampled_from([None, np.pi]))
+def test_quaternions_turn_as_their_rotations(angles, third):
+    if third is not None:
+        # Half a turn: the scalar is zero.
+        angles = np.array((0.0, 0.0, third))
+    rotation = rotation_xyz(angles)
+    w, *v = quaternion(rotation)
+    about = skew(np.array(v))
+    assert np.eye(3) + 2.0 * about @ (w * np.eye(3) + about) == pytest.approx(rotation, abs=1e-15)
+    assert quaternion(np.array([np.eye(3), rotation]))[1] == pytest.approx((w, *v), abs=0.0)
+
+
+@given(vectors, st.sampled_from([None, -np.pi / 2, np.pi / 2]))
+def test_angles_of_a_rotation_make_that_rotation(angles, second):
+    if second is not None:
+        angles[1] = second
+    rotation = rotation_xyz(angles)
+    result = angles_xyz(rotation)
+    assert abs(result[1]) <= np.pi / 2
+    assert rotation_xyz(result) == pytest.approx(rotation, abs=1e-7 if second is None else 1e-14)
+
+
+def test_a_rotation_keeps_its_axis_and_turns_the_right_way():
+    axis = np.array((1.0, 2.0, 2.0)) / 3.0
+    turn = rotation_about(axis, 0.7)
+    assert turn @ axis == pytest.approx(axis, abs=1e-15)
+    assert turn @ turn.T == pytest.approx(np.eye(3), abs=1e-15)
+    assert rotation_about(AXES[2], np.pi / 2) @ AXES[0] == pytest.approx(AXES[1], abs=1e-15)
+
+
+@given(vectors, vectors)
+def test_inverse_undoes_an_offset(translation, orientation):
+    matrix = offset(translation, orientation)
+    assert matrix[:3, 3] == pytest.approx(translation)
+    assert inverse(matrix) @ matrix == pytest.approx(np.eye(4), abs=1e-14)
+    assert transform() == pytest.approx(np.eye(4))
+
+
+def _motion(seed):
+    rng = np.random.default_rng(seed)
+    block = rng.normal(size=(6, 5))
+    return RelativeMotion(rotation_xyz(rng.uniform(-1, 1, 3)), rng.normal(size=3), block)
+
+
+def _same(one, other):
+    assert one.matrix == pytest.approx(other.matrix, abs=1e-12)
+    assert one.block == pytest.approx(other.block, abs=1e-11)
+
+
+@given(seeds, seeds, seeds)
+def test_relative_motions_form_a_group(first, second, third):
+    a, b, c = _motion(first), _motion(second), _motion(third)
+    _same(a.then(b).then(c), a.then(b.then(c)))
+    _same(a.inverse().inverse(), a)
+    _same(a.then(b).inverse(), b.inverse().then(a.inverse()))
+    _same(a.then(a.inverse()), RelativeMotion.fixed(np.eye(4), 3))

@@ -1,0 +1,137 @@
+"""Environments of gymnasium: what its checker says, seeds, and many copies beside single ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+gymnasium = pytest.importorskip("gymnasium", reason="needs gymnasium (extra 'gym')")
+
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+
+import osimlite  # noqa: E402
+from osimlite.base.records import replace  # noqa: E402
+from osimlite.errors import OsimliteError  # noqa: E402
+from osimlite.simulation.integrators import INTEGRATORS  # noqa: E402
+from osimlite.studies.gym.environments import MuscleEnv, MuscleVectorEnv  # noqa: E402
+from osimlite.studies.gym.tasks import TASKS  # noqa: E402
+
+NAMES = [f"osimlite/{name}" for name in TASKS]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_gymnasium_finds_nothing_wrong(name: str) -> None:
+    env = gymnasium.make(name, render_mode="rgb_array").unwrapped
+    check_env(env)
+    picture = env.render()
+    assert picture.shape == (360, 480, 3) and picture.std() > 5.0
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "count", "integrator"),
+    [("Arm-v0", 64, "merson"), ("Walk2D-v0", 6, "merson"), *(("Arm-v0", 5, name) for name in INTEGRATORS)],
+)
+def test_copies_are_single_environments_bit_for_bit(name: str, count: int, integrator: str) -> None:
+    """Through episodes that end and begin anew, beside another environment of the same model."""
+    task = replace(TASKS[name](), integrator=integrator, seconds=0.2)
+    many, another, one = MuscleVectorEnv(count, task), MuscleVectorEnv(2, task), MuscleEnv(task)
+    rng = np.random.default_rng(0)
+    actions = [rng.random(many.action_space.shape, dtype=np.float32) for _ in range(45)]
+    first, _ = many.reset(seed=5)
+    another.reset(seed=1)
+    found = []
+    for action in actions:
+        found.append(many.step(action)[:4])
+        another.step(action[:2])
+    for k in range(count):
+        observation, _ = one.reset(seed=5 + k)
+        assert np.array_equal(observation, first[k])
+        is_over = False
+        for action, (observations, rewards, over, late) in zip(actions, found, strict=True):
+            if is_over:
+                observation, reward, ended = one.reset()[0], 0.0, [False, False]
+            else:
+                observation, reward, *ended, _ = one.step(action[k])
+            assert np.array_equal(observation, observations[k]) and reward == rewards[k]
+            assert (over[k], late[k]) == tuple(ended)
+            is_over = any(ended)
+    for env in (many, another, one):
+        env.close()
+
+
+def test_steps_go_by_the_integrator_of_the_task() -> None:
+    """The same motion, but for the error of the methods."""
+    ends = {}
+    for name in INTEGRATORS:
+        env = MuscleEnv(replace(TASKS["Arm-v0"](), integrator=name, accuracy=1e-6))
+        env.reset(seed=3)
+        for number in range(30):
+            observation, *_ = env.step(np.array([0.3, 0.1 * (number % 3)], dtype=np.float32))
+        ends[name] = observation
+        env.close()
+    merson = ends.pop("merson")
+    for other in ends.values():
+        assert 0.0 < np.abs(other - merson).max() < 1e-3
+
+
+def test_copies_begin_anew_after_their_episodes() -> None:
+    many = gymnasium.make_vec("osimlite/Arm-v0", num_envs=2)
+    many.reset(seed=0)
+    actions = np.array([[0.0, 0.0], [0.2, 0.0]], dtype=np.float32)
+    for number in range(1, 203):
+        observations, rewards, over, late, _ = many.step(actions)
+        assert not over.any()
+        if number == 200:
+            assert late.all()
+        elif number == 201:
+            assert not late.any() and (rewards == 0.0).all() and np.abs(observations[:, 0] - 0.5).max() < 0.11
+        else:
+            assert not late.any() and (rewards != 0.0).all()
+    many.close()
+
+
+def test_any_model_has_a_task(tmp_path) -> None:
+    from osimlite.models.jumper import jumper
+    from osimlite.models.walkers import furthest_walker
+
+    osimlite.write(jumper(driven=False), tmp_path / "jumper.osim")
+    env = gymnasium.make(
+        "osimlite/Model-v0",
+        model=tmp_path / "jumper.osim",
+        reward=lambda before, after: after["pelvis_ty"] - before["pelvis_ty"],
+        hidden=("pelvis_tx",),
+        seconds=0.05,
+    ).unwrapped
+    assert "pelvis_tx" not in env.labels and "soleus_r/activation" in env.labels and len(env.controls) == 16
+    env.reset(seed=1)
+    ends = [env.step(np.full(16, 0.02, dtype=np.float32))[3] for _ in range(5)]
+    assert ends == [False] * 4 + [True]
+    with pytest.raises(OsimliteError, match="no actuators"):
+        gymnasium.make("osimlite/Model-v0", model=furthest_walker(), reward=lambda before, after: 0.0)
+    with pytest.raises(gymnasium.error.Error, match="give a task"):
+        gymnasium.make("osimlite/Model-v0")
+
+
+@pytest.mark.parametrize(
+    ("choices", "words"),
+    [
+        ({"secnods": 1.0}, "a task has no 'secnods'.*did you mean 'seconds'"),
+        ({"render_mode": "human"}, "pictures come as 'rgb_array', not as 'human'"),
+        ({"hidden": ("shoulder",)}, "nothing is called 'shoulder' that could be hidden"),
+        ({"model": "arm.osim"}, "this environment has its model"),
+    ],
+)
+def test_what_an_environment_does_not_know_is_refused(choices, words) -> None:
+    with pytest.raises(gymnasium.error.Error, match=words):
+        gymnasium.make("osimlite/Arm-v0", **choices).unwrapped.close()
+
+
+def test_a_task_can_be_another_in_parts() -> None:
+    env = gymnasium.make("osimlite/Arm-v0", seconds=0.02, reward=lambda before, after: np.full(1, 7.0)).unwrapped
+    env.reset(seed=0)
+    action = np.zeros(env.action_space.shape)
+    assert env.step(action)[1] == 7.0 and env.step(action)[3]
+    with pytest.raises(gymnasium.error.InvalidAction, match=r"actions have the shape \(1, 2\), not \(1, 3\)"):
+        env.step(np.zeros(3))
+    env.close()

@@ -1,0 +1,94 @@
+"""Auxiliary states in sweeps: measured, carried by both engines, and the same after an interruption."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from osimlite.simulation import Simulation
+from osimlite.studies.sweep.plan import plan
+from osimlite.studies.sweep.run import Interrupted, sweep
+from osimlite.studies.sweep.runner import Runner
+from osimlite.studies.sweep.sampling import samples
+from tests.oracle.random_models import RandomModel
+from tests.simulation.elements.muscle_rows import hung, muscle
+
+pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
+pytest.importorskip("pybullet", reason="needs pybullet (extra 'sim')")
+
+
+def interrupt(done, of):
+    if done >= 6:
+        raise KeyboardInterrupt
+
+
+def all_of_them(run):
+    """Every state at the start, at the reports and at the end is there by its name."""
+    assert len(run.end) == len(list(run.end))
+    for path in run.engine.state.paths:
+        assert run.start[path] == 0.0 and run.history(path)[-1] == run.end[path]
+    return sum(run.end[path] for path in run.engine.state.paths)
+
+
+@settings(max_examples=3, deadline=None, derandomize=True, phases=[Phase.generate])
+@given(seed=st.integers(0, 10**6))
+def test_random_models_keep_their_states_through_an_interruption(seed, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sweep")
+    random = RandomModel(seed)
+    random.model.add(random.bushing("bushing"))
+    coordinate = next(item for item in random.coordinates if not item.locked)
+    vary = {coordinate.name: (-0.2, 0.2), "/forceset/bushing/rotational_damping/1": (0.1, 0.5)}
+    with Simulation(random.model, "compiled") as simulation:
+        paths = simulation.state.paths
+    made = plan(
+        random.model, vary, measures=(*paths, all_of_them), to=0.02, accuracy=1e-7, report_interval=0.01
+    )  # fmt: skip
+    chosen = samples(made.variables, "sobol", 16, 1)
+    whole = sweep(made, chosen, folder / "whole.parquet", workers=1).path
+    with pytest.raises(Interrupted):
+        sweep(made, chosen, folder / "r.parquet", workers=1, progress=interrupt)
+    resumed = sweep(made, chosen, folder / "r.parquet", resume=True, workers=1)
+    assert resumed.before > 0 and resumed.path.read_bytes() == whole.read_bytes()
+    table, values = pq.read_table(whole).to_pydict(), chosen.block(0, 16)
+    theirs = Runner(replace(made, engine="bullet")).run(values[3:4]).measures
+    bushing = random.model.tree().by_path["/forceset/bushing"]
+    x, _, z = bushing.rotational_damping
+    bushing.rotational_damping = (x, values[3, 1], z)
+    with Simulation(random.model, "compiled") as simulation:
+        alone = simulation.run(0.02, accuracy=1e-7, initial={coordinate.name: values[3, 0]}).auxiliary
+    for path in paths:
+        # Under constraints, a batch moves its start by a rounding.
+        assert table[path][3] == pytest.approx(alone[path][-1], rel=1e-9, abs=1e-12)
+        assert theirs[path][0] == pytest.approx(alone[path][-1], rel=1e-6, abs=1e-9)
+    sums = np.sum([table[path] for path in paths], axis=0)
+    assert np.allclose(table[f"{__name__}:all_of_them"], sums) and (sums > 0.0).any()
+
+
+@pytest.mark.parametrize("engine", ["bullet", "compiled"])
+def test_runs_may_start_in_equilibrium(engine):
+    """Each from its own place, and with the numbers of its own muscle; where there is none, it is told."""
+    model = hung(muscle("thelen_default"), [0.3, 0.3])
+    slack = "/forceset/mu/tendon_slack_length"
+    made = plan(
+        model,
+        {"x": (0.3, 0.34, 2), slack: (0.26, 0.28, 2), "/forceset/mu/default_activation": 0.2},
+        measures=("/forceset/mu/fiber_length",),
+        to=0.02,
+        accuracy=1e-6,
+        engine=engine,
+        equilibrate=True,
+    )
+    values = np.array([[0.3, 0.26, 0.2], [0.34, 0.28, 0.2], [0.3, 0.28, 0.2], [5.0, 0.27, 0.2]])
+    block = Runner(made).run(values)
+    assert block.status == ["done"] * 3 + ["failed"]
+    assert "no equilibrium was found of '/forceset/mu', whose path of 5 m is 4.68 m longer" in block.reasons[3]
+    for index, (x, length, activation) in enumerate(values[:3]):
+        force = muscle("thelen_default", tendon_slack_length=length, default_activation=activation)
+        with Simulation(hung(force, [0.3, 0.3]), engine) as simulation:
+            alone = simulation.run(0.02, accuracy=1e-6, initial={"x": x}, equilibrate=True)
+        result = alone.auxiliary["/forceset/mu/fiber_length"][-1]
+        assert block.measures["/forceset/mu/fiber_length"][index] == pytest.approx(result, rel=1e-12)
